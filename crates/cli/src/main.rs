@@ -1,0 +1,2 @@
+//! palpate
+fn main() {}
