@@ -4,19 +4,30 @@
 //! The model never changes after it is built; the results for one configuration are another value ([`Kinematics`]).
 //! Transforms are named `a_from_b`, quantities `x_in_a`; units are SI, angles radians, stamps integer nanoseconds.
 
+mod clean;
 mod error;
 mod joint_map;
 mod kinematics;
+mod link_mesh;
+mod load;
 mod mesh;
+mod mesh_file;
+mod mesh_source;
 mod pairing;
 mod robot;
 mod sample;
+mod shape;
+mod split;
 mod surface;
+mod urdf;
 
+pub use clean::Cleaning;
 pub use error::ModelError;
 pub use joint_map::JointMap;
 pub use kinematics::Kinematics;
-pub use mesh::TriangleMesh;
+pub use load::{Geometry, LinkReport, LoadOptions, LoadReport};
+pub use mesh::{EdgeCount, TriangleMesh};
+pub use mesh_source::{EmbeddedMeshes, MeshFiles, MeshSource};
 pub use pairing::{Pairing, PairingLosses};
 pub use robot::{Joint, JointKind, JointLimits, Link, Robot};
 pub use sample::JointSample;

@@ -1,6 +1,8 @@
 //! Triangle meshes.
 
-use nalgebra::Point3;
+use std::collections::HashMap;
+
+use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Triangles over shared vertices. Cleaned by its loaders: no duplicate vertices, no degenerate triangles, indices in
 /// range, coordinates finite.
@@ -17,4 +19,105 @@ impl TriangleMesh {
     pub fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
         self.triangles[triangle].map(|vertex| self.vertices[vertex as usize])
     }
+
+    /// Volume enclosed, m³: positive where the triangles face outwards. Taken from the mean of the vertices, so that it
+    /// also means something for a mesh with small holes.
+    pub fn signed_volume(&self) -> f64 {
+        let sum: Vector3<f64> = self.vertices.iter().map(|vertex| vertex.coords).sum();
+        let centre = Point3::from(sum / self.vertices.len().max(1) as f64);
+        let sixfold = |corners: [Point3<f64>; 3]| {
+            let [a, b, c] = corners.map(|corner| corner - centre);
+            a.dot(&b.cross(&c))
+        };
+        (0..self.triangles.len())
+            .map(|triangle| sixfold(self.corners(triangle)))
+            .sum::<f64>()
+            / 6.0
+    }
+
+    /// Area of all triangles, m².
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len())
+            .map(|triangle| {
+                let [a, b, c] = self.corners(triangle);
+                (b - a).cross(&(c - a)).norm() / 2.0
+            })
+            .sum()
+    }
+
+    /// Diagonal of the bounding box, m; zero for a mesh without vertices.
+    pub fn extent(&self) -> f64 {
+        let Some(first) = self.vertices.first() else {
+            return 0.0;
+        };
+        let (low, high) = (self.vertices.iter()).fold((*first, *first), |(low, high), vertex| {
+            (low.inf(vertex), high.sup(vertex))
+        });
+        (high - low).norm()
+    }
+
+    /// Scales the vertices; a reflection also turns the triangles over, so that they still face outwards.
+    pub(crate) fn scale(&mut self, scale: &Vector3<f64>) {
+        for vertex in &mut self.vertices {
+            vertex.coords.component_mul_assign(scale);
+        }
+        if scale.iter().filter(|factor| **factor < 0.0).count() % 2 == 1 {
+            self.flip();
+        }
+    }
+
+    /// Moves the vertices to another frame.
+    pub(crate) fn transform(&mut self, a_from_b: &Isometry3<f64>) {
+        for vertex in &mut self.vertices {
+            *vertex = a_from_b * *vertex;
+        }
+    }
+
+    /// Turns every triangle over.
+    pub(crate) fn flip(&mut self) {
+        for triangle in &mut self.triangles {
+            triangle.swap(1, 2);
+        }
+    }
+
+    /// Adds the triangles of another mesh, none of whose vertices are shared.
+    pub(crate) fn append(&mut self, other: &Self) {
+        let offset = self.vertices.len() as u32;
+        self.vertices.extend_from_slice(&other.vertices);
+        let moved = |triangle: &[u32; 3]| triangle.map(|vertex| vertex + offset);
+        self.triangles.extend(other.triangles.iter().map(moved));
+    }
+
+    /// How the triangles meet along their edges.
+    pub fn edges(&self) -> EdgeCount {
+        let mut uses: HashMap<[u32; 2], (u32, u32)> = HashMap::new();
+        for [a, b, c] in &self.triangles {
+            for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
+                let count = uses.entry([from.min(to), from.max(to)]).or_default();
+                if from < to {
+                    count.0 += 1;
+                } else {
+                    count.1 += 1;
+                }
+            }
+        }
+        let count = |wanted: fn(&(u32, u32)) -> bool| uses.values().filter(|u| wanted(u)).count();
+        EdgeCount {
+            total: uses.len(),
+            open: count(|(forth, back)| forth + back == 1),
+            inconsistent: count(|(forth, back)| forth + back > 1 && forth != back),
+        }
+    }
+}
+
+/// How the triangles of a mesh meet along their edges.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EdgeCount {
+    /// All edges, each once.
+    pub total: usize,
+    /// Edges with one triangle only: the rims of holes.
+    pub open: usize,
+    /// Edges whose triangles do not run along them equally often both ways: neighbours disagree on which side is
+    /// outside, or an odd number of triangles meet.
+    pub inconsistent: usize,
 }

@@ -1,0 +1,97 @@
+//! Splitting of coarse triangles.
+
+use std::collections::HashMap;
+
+use nalgebra::center;
+
+use crate::{ModelError, TriangleMesh};
+
+/// Splitting stops with an error beyond this many triangles: a mesh that needs more is given in the wrong unit.
+const MOST_TRIANGLES: usize = 2_000_000;
+
+/// Splits triangles until no edge is longer than `max_edge`, m. Returns how many edges were halved.
+///
+/// In each round every edge that is too long gets one new vertex in its middle, and each triangle is divided by those
+/// on its edges. The vertex belongs to the edge, so neighbours always agree and no vertex ends up inside an edge.
+///
+/// # Errors
+/// If the mesh would need more than two million triangles.
+pub(crate) fn split(mesh: &mut TriangleMesh, max_edge: f64) -> Result<usize, ModelError> {
+    let extent = mesh.extent();
+    let mut halved = 0;
+    loop {
+        let mut middles = HashMap::new();
+        let mut triangles = Vec::with_capacity(mesh.triangles.len());
+        for index in 0..mesh.triangles.len() {
+            let [a, b, c] = mesh.triangles[index];
+            let middle = [(a, b), (b, c), (c, a)]
+                .map(|(from, to)| middle_if_long(mesh, &mut middles, from, to, max_edge));
+            divide(mesh, [a, b, c], middle, &mut triangles);
+        }
+        mesh.triangles = triangles;
+        if middles.is_empty() {
+            return Ok(halved);
+        }
+        halved += middles.len();
+        if mesh.triangles.len() > MOST_TRIANGLES {
+            return Err(ModelError::MeshTooLarge {
+                limit: MOST_TRIANGLES,
+                max_edge,
+                extent,
+            });
+        }
+    }
+}
+
+fn middle_if_long(
+    mesh: &mut TriangleMesh,
+    middles: &mut HashMap<[u32; 2], u32>,
+    from: u32,
+    to: u32,
+    max_edge: f64,
+) -> Option<u32> {
+    let [a, b] = [from.min(to), from.max(to)];
+    let (start, end) = (mesh.vertices[a as usize], mesh.vertices[b as usize]);
+    if (end - start).norm() <= max_edge {
+        return None;
+    }
+    Some(*middles.entry([a, b]).or_insert_with(|| {
+        mesh.vertices.push(center(&start, &end));
+        mesh.vertices.len() as u32 - 1
+    }))
+}
+
+/// Divides the triangle a b c by the middles of a-b, b-c and c-a, where there are any.
+fn divide(
+    mesh: &TriangleMesh,
+    [a, b, c]: [u32; 3],
+    middle: [Option<u32>; 3],
+    out: &mut Vec<[u32; 3]>,
+) {
+    match middle {
+        [None, None, None] => out.push([a, b, c]),
+        [Some(ab), None, None] => out.extend([[a, ab, c], [ab, b, c]]),
+        [None, Some(_), None] => divide(mesh, [b, c, a], [middle[1], None, None], out),
+        [None, None, Some(_)] => divide(mesh, [c, a, b], [middle[2], None, None], out),
+        [Some(ab), Some(bc), None] => {
+            out.push([ab, b, bc]);
+            divide_quad(mesh, [a, ab, bc, c], out);
+        }
+        [None, Some(_), Some(_)] => divide(mesh, [b, c, a], [middle[1], middle[2], None], out),
+        [Some(_), None, Some(_)] => divide(mesh, [c, a, b], [middle[2], middle[0], None], out),
+        [Some(ab), Some(bc), Some(ca)] => {
+            out.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+    }
+}
+
+/// Divides a quadrilateral along its shorter diagonal.
+fn divide_quad(mesh: &TriangleMesh, [a, b, c, d]: [u32; 4], out: &mut Vec<[u32; 3]>) {
+    let length =
+        |from: u32, to: u32| (mesh.vertices[to as usize] - mesh.vertices[from as usize]).norm();
+    if length(a, c) <= length(b, d) {
+        out.extend([[a, b, c], [a, c, d]]);
+    } else {
+        out.extend([[a, b, d], [b, c, d]]);
+    }
+}
