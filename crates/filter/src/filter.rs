@@ -1,11 +1,27 @@
 //! The filter: one `update` a sample.
 
-use palpate_model::Robot;
+use palpate_model::{Kinematics, Robot};
 
+use crate::detector::Detector;
+use crate::modes::ModeFinder;
+use crate::paper::PaperFilter;
+use crate::skin::Skin;
+use crate::step::Step;
 use crate::{Admitted, ContactEstimate, ContactStatus, ParameterError, Parameters, Particle};
 
 /// A particle filter for contacts on one robot. Deterministic for a seed, at any number of threads.
 pub struct Filter {
+    robot: Robot,
+    skin: Skin,
+    parameters: Parameters,
+    detector: Detector,
+    method: PaperFilter,
+    modes: ModeFinder,
+    before: Kinematics,
+    now: Kinematics,
+    position_before: Vec<f64>,
+    number: u64,
+    cloud: Vec<Particle>,
     estimate: ContactEstimate,
 }
 
@@ -14,23 +30,81 @@ impl Filter {
     ///
     /// # Errors
     /// If a parameter is out of range, or the robot has no link that can be touched.
-    pub fn new(
-        _robot: &Robot,
-        _parameters: &Parameters,
-        _seed: u64,
-    ) -> Result<Self, ParameterError> {
-        let estimate = ContactEstimate {
-            stamp_ns: 0,
-            status: ContactStatus::NoContact,
-            modes: Vec::new(),
+    pub fn new(robot: &Robot, parameters: &Parameters, seed: u64) -> Result<Self, ParameterError> {
+        parameters.check()?;
+        let nothing = || ParameterError::NothingToTouch {
+            robot: robot.name.clone(),
         };
-        Ok(Self { estimate })
+        let skin = Skin::new(robot).ok_or_else(nothing)?;
+        let count = parameters.particles;
+        Ok(Self {
+            detector: Detector::new(parameters.detector.clone(), robot.dof()),
+            method: PaperFilter::new(parameters.paper.clone(), count, robot.links.len(), seed),
+            modes: ModeFinder::new(robot, &skin),
+            before: Kinematics::new(robot),
+            now: Kinematics::new(robot),
+            position_before: vec![0.0; robot.dof()],
+            number: 0,
+            cloud: Vec::with_capacity(count),
+            estimate: ContactEstimate {
+                stamp_ns: 0,
+                status: ContactStatus::NoContact,
+                modes: Vec::new(),
+            },
+            robot: robot.clone(),
+            skin,
+            parameters: parameters.clone(),
+        })
     }
 
     /// Takes one sample in. Cannot fail, and allocates nothing in steady state.
     pub fn update(&mut self, sample: Admitted<'_>) -> &ContactEstimate {
-        self.estimate.stamp_ns = sample.sample().stamp_ns;
+        let sample = sample.sample();
+        std::mem::swap(&mut self.before, &mut self.now);
+        self.now.update(&self.robot, &sample.position);
+        let was_in_contact = self.estimate.status != ContactStatus::NoContact;
+        let in_contact = self
+            .detector
+            .update(sample.stamp_ns, &sample.external_torque);
+        self.cloud.clear();
+        if in_contact {
+            if !was_in_contact {
+                self.before.clone_from(&self.now);
+                self.position_before.copy_from_slice(&sample.position);
+                self.method
+                    .begin(&self.skin, self.number, self.parameters.particles);
+            }
+            self.method.step(&Step {
+                robot: &self.robot,
+                skin: &self.skin,
+                before: &self.before,
+                now: &self.now,
+                position_before: &self.position_before,
+                position: &sample.position,
+                torque: &sample.external_torque,
+                number: self.number,
+            });
+            self.method.show(&self.skin, &mut self.cloud);
+        }
+        self.summarise(sample.stamp_ns, in_contact);
+        self.position_before.copy_from_slice(&sample.position);
+        self.number += 1;
         &self.estimate
+    }
+
+    fn summarise(&mut self, stamp_ns: i64, in_contact: bool) {
+        self.estimate.stamp_ns = stamp_ns;
+        self.modes
+            .find(&self.cloud, &self.skin, &self.now, &mut self.estimate.modes);
+        let located = self.estimate.modes.first().is_some_and(|mode| {
+            mode.probability >= self.parameters.located_probability
+                && mode.std() <= self.parameters.located_std
+        });
+        self.estimate.status = match (in_contact, located) {
+            (false, _) => ContactStatus::NoContact,
+            (true, false) => ContactStatus::Ambiguous,
+            (true, true) => ContactStatus::Located,
+        };
     }
 
     /// The estimate after the last update.
@@ -38,13 +112,20 @@ impl Filter {
         &self.estimate
     }
 
-    /// Writes the particles into `cloud`, replacing what it holds. Empty without contact.
-    pub fn particles(&self, cloud: &mut Vec<Particle>) {
-        cloud.clear();
+    /// Kinematics at the last sample.
+    pub fn kinematics(&self) -> &Kinematics {
+        &self.now
+    }
+
+    /// The particles after the last update. Empty without contact.
+    pub fn particles(&self) -> &[Particle] {
+        &self.cloud
     }
 
     /// Forgets everything learned, as at the start.
     pub fn reset(&mut self) {
+        self.detector.reset();
+        self.cloud.clear();
         self.estimate.status = ContactStatus::NoContact;
         self.estimate.modes.clear();
     }

@@ -1,13 +1,24 @@
 //! Where the contact is: a particle filter over the triangles of each link's mesh.
 
+mod detector;
 mod estimate;
 mod filter;
 mod intake;
+mod modes;
+mod paper;
 mod parameters;
 mod particle;
+mod random;
+mod resample;
+mod settings;
+mod skin;
+mod step;
 
+pub use detector::DetectorParameters;
 pub use estimate::{ContactEstimate, ContactStatus, Mode};
 pub use filter::Filter;
 pub use intake::{Admitted, Intake, IntakeCounts, Refusal};
+pub use paper::{MotionModel, PaperParameters};
 pub use parameters::{ParameterError, Parameters};
 pub use particle::Particle;
+pub use settings::{Geometry, InputSettings, RobotSettings, Settings, SettingsError, VizSettings};

@@ -2,17 +2,66 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::detector::DetectorParameters;
+use crate::paper::PaperParameters;
+
 /// Parameters of the filter. Each field has its unit and default; unknown keys are refused.
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
     /// Number of particles. Default 10,000.
     pub particles: usize,
+    /// A contact counts as located when its first mode has at least this probability. Default 0.6.
+    pub located_probability: f64,
+    /// … and at most this standard deviation of the position, m. Default 0.03.
+    pub located_std: f64,
+    /// When something touches.
+    pub detector: DetectorParameters,
+    /// The paper's filter.
+    pub paper: PaperParameters,
 }
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { particles: 10_000 }
+        Self {
+            particles: 10_000,
+            located_probability: 0.6,
+            located_std: 0.03,
+            detector: DetectorParameters::default(),
+            paper: PaperParameters::default(),
+        }
+    }
+}
+
+impl Parameters {
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// Names the parameter, what is allowed and what was found.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let check = ParameterError::check;
+        let count = self.particles as f64;
+        check(
+            "filter.particles",
+            "100 … 10,000,000",
+            count,
+            (100.0..=1e7).contains(&count),
+        )?;
+        let probability = (0.0..=1.0).contains(&self.located_probability);
+        check(
+            "filter.located_probability",
+            "0 … 1",
+            self.located_probability,
+            probability,
+        )?;
+        check(
+            "filter.located_std",
+            "> 0",
+            self.located_std,
+            self.located_std > 0.0,
+        )?;
+        self.detector.check()?;
+        self.paper.check()
     }
 }
 
@@ -32,4 +81,31 @@ pub enum ParameterError {
         /// What was found.
         found: String,
     },
+    /// The robot has nothing to touch.
+    #[error(
+        "robot {robot} has no link with both a mesh and a movable joint on its path: nothing can be located"
+    )]
+    NothingToTouch {
+        /// Name of the robot.
+        robot: String,
+    },
+}
+
+impl ParameterError {
+    /// Refuses `found` unless `good`. NaN is never good, as no comparison with it holds.
+    pub(crate) fn check(
+        name: &'static str,
+        expected: &'static str,
+        found: f64,
+        good: bool,
+    ) -> Result<(), Self> {
+        if good && found.is_finite() {
+            return Ok(());
+        }
+        Err(Self::Range {
+            name,
+            expected,
+            found: found.to_string(),
+        })
+    }
 }

@@ -1,0 +1,67 @@
+//! What can be touched: the surfaces of all links whose contacts the joints can feel.
+
+use palpate_model::{Robot, Surface, SurfacePoint};
+
+/// The robot's touchable surfaces.
+pub(crate) struct Skin {
+    surfaces: Vec<Option<Surface>>,
+    links: Vec<usize>,
+    /// Area of the touchable links up to and with each one, m².
+    cumulative_area: Vec<f64>,
+}
+
+impl Skin {
+    /// The surfaces of every link that has a mesh and at least one movable joint on its path. None if no link has.
+    pub(crate) fn new(robot: &Robot) -> Option<Self> {
+        let surface = |link: &palpate_model::Link| match link.path.is_empty() {
+            true => None,
+            false => link.mesh.as_ref().and_then(Surface::new),
+        };
+        let surfaces: Vec<_> = robot.links.iter().map(surface).collect();
+        let links: Vec<_> = (0..surfaces.len())
+            .filter(|&link| surfaces[link].is_some())
+            .collect();
+        let mut total = 0.0;
+        let cumulative_area = (surfaces.iter().flatten())
+            .map(|surface| {
+                total += surface.area();
+                total
+            })
+            .collect();
+        (!links.is_empty()).then_some(Self {
+            surfaces,
+            links,
+            cumulative_area,
+        })
+    }
+
+    /// Indices of the touchable links.
+    pub(crate) fn links(&self) -> &[usize] {
+        &self.links
+    }
+
+    /// The surface of a link; none where it cannot be touched.
+    pub(crate) fn get(&self, link: usize) -> Option<&Surface> {
+        self.surfaces[link].as_ref()
+    }
+
+    /// The surface of a touchable link.
+    pub(crate) fn surface(&self, link: usize) -> &Surface {
+        self.surfaces[link]
+            .as_ref()
+            .expect("particles live on touchable links only")
+    }
+
+    /// A link and a point on it, uniform over the area of all touchable links, for four uniform numbers in \[0, 1).
+    pub(crate) fn sample(&self, uniform: [f64; 4]) -> (usize, SurfacePoint) {
+        let total = self.cumulative_area.last().copied().unwrap_or(0.0);
+        let wanted = uniform[0] * total;
+        let index = self.cumulative_area.partition_point(|&area| area <= wanted);
+        let link = self.links[index.min(self.links.len() - 1)];
+        (
+            link,
+            self.surface(link)
+                .sample([uniform[1], uniform[2], uniform[3]]),
+        )
+    }
+}
