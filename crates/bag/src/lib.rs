@@ -1,1 +1,20 @@
-//! placeholder
+//! Samples and estimates on disk: rosbag2 bags in MCAP and sqlite3, read by the definitions that they carry.
+
+mod bag;
+mod cdr;
+mod definition;
+mod error;
+mod mcap_file;
+mod metadata;
+mod samples;
+mod source;
+mod sqlite_file;
+mod standard;
+mod value;
+
+pub use bag::{Bag, Message, Topic};
+pub use cdr::{CdrError, decode};
+pub use definition::Definition;
+pub use error::BagError;
+pub use samples::{Recording, TopicChoice, TopicReport, Unusable, read_samples};
+pub use value::Value;
