@@ -6,6 +6,7 @@
 
 mod clean;
 mod error;
+mod iiwa14;
 mod joint_map;
 mod kinematics;
 mod link_mesh;
@@ -23,6 +24,7 @@ mod urdf;
 
 pub use clean::Cleaning;
 pub use error::ModelError;
+pub use iiwa14::{IIWA14_MESHES, IIWA14_URDF, iiwa14};
 pub use joint_map::JointMap;
 pub use kinematics::Kinematics;
 pub use load::{Geometry, LinkReport, LoadOptions, LoadReport};

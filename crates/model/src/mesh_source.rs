@@ -16,8 +16,9 @@ pub trait MeshSource {
 /// Meshes in files: `package://`, `file://`, absolute, and relative to the URDF.
 ///
 /// `package://name/path` is looked for, in this order, as `path` in a package folder that is itself called `name`, as
-/// `name/path` in each package folder, as `share/name/path` under each ament prefix, and as `path` in a folder called
-/// `name` that the URDF lies in, however deep.
+/// `name/path` in each package folder, as `share/name/path` under each ament prefix, as `path` in a folder called
+/// `name` that the URDF lies in, however deep, and as `path` beside the URDF's folder, which is where a ROS package has
+/// it, whatever the folder of a checkout is called.
 #[derive(Clone, Debug, Default)]
 pub struct MeshFiles {
     urdf_dir: PathBuf,
@@ -68,6 +69,7 @@ impl MeshFiles {
             .chain(below)
             .chain(share)
             .chain(around.map(Path::to_owned))
+            .chain(self.urdf_dir.parent().map(Path::to_owned))
             .map(|dir| dir.join(path))
             .collect()
     }
