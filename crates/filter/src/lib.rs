@@ -21,4 +21,4 @@ pub use intake::{Admitted, Intake, IntakeCounts, Refusal};
 pub use paper::{MotionModel, PaperParameters};
 pub use parameters::{ParameterError, Parameters};
 pub use particle::Particle;
-pub use settings::{Geometry, InputSettings, RobotSettings, Settings, SettingsError, VizSettings};
+pub use settings::{InputSettings, RobotSettings, Settings, SettingsError, VizSettings};
