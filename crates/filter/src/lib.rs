@@ -10,6 +10,7 @@ mod parameters;
 mod particle;
 mod random;
 mod resample;
+mod scene;
 mod settings;
 mod skin;
 mod step;
@@ -21,4 +22,8 @@ pub use intake::{Admitted, Intake, IntakeCounts, Refusal};
 pub use paper::{MotionModel, PaperParameters};
 pub use parameters::{ParameterError, Parameters};
 pub use particle::Particle;
+pub use scene::{
+    Arrow, CLOUD_FIELDS, CLOUD_POINT_STEP, CloudField, CloudFieldType, CloudPoint, Colour,
+    ContactPose, Label, Scene, pack_cloud,
+};
 pub use settings::{InputSettings, RobotSettings, Settings, SettingsError, VizSettings};
