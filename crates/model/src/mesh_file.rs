@@ -1,5 +1,7 @@
 //! Mesh files, told apart by their extension.
 
+mod dae;
+mod dae_primitive;
 mod obj;
 mod stl;
 
@@ -12,6 +14,7 @@ use crate::{ModelError, TriangleMesh};
 pub(crate) fn parse(uri: &str, bytes: &[u8]) -> Result<TriangleMesh, ModelError> {
     let extension = uri.rsplit_once('.').map_or("", |(_, extension)| extension);
     match extension.to_ascii_lowercase().as_str() {
+        "dae" => dae::parse(bytes),
         "obj" => obj::parse(bytes),
         "stl" => stl::parse(bytes),
         _ => Err(ModelError::MeshKind {

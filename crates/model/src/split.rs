@@ -6,6 +6,9 @@ use nalgebra::center;
 
 use crate::{ModelError, TriangleMesh};
 
+/// Beyond this ratio of a coordinate to the longest edge, halving an edge would soon be lost in rounding.
+const MOST_RATIO: f64 = 1e9;
+
 /// Splitting stops with an error beyond this many triangles: a mesh that needs more is given in the wrong unit.
 const MOST_TRIANGLES: usize = 2_000_000;
 
@@ -17,7 +20,17 @@ const MOST_TRIANGLES: usize = 2_000_000;
 /// # Errors
 /// If the mesh would need more than two million triangles.
 pub(crate) fn split(mesh: &mut TriangleMesh, max_edge: f64) -> Result<usize, ModelError> {
-    let extent = mesh.extent();
+    let too_large = ModelError::MeshTooLarge {
+        limit: MOST_TRIANGLES,
+        max_edge,
+        extent: mesh.extent(),
+    };
+    let farthest = (mesh.vertices.iter())
+        .map(|vertex| vertex.coords.amax())
+        .fold(0.0, f64::max);
+    if farthest > MOST_RATIO * max_edge {
+        return Err(too_large);
+    }
     let mut halved = 0;
     loop {
         let mut middles = HashMap::new();
@@ -34,11 +47,7 @@ pub(crate) fn split(mesh: &mut TriangleMesh, max_edge: f64) -> Result<usize, Mod
         }
         halved += middles.len();
         if mesh.triangles.len() > MOST_TRIANGLES {
-            return Err(ModelError::MeshTooLarge {
-                limit: MOST_TRIANGLES,
-                max_edge,
-                extent,
-            });
+            return Err(too_large);
         }
     }
 }

@@ -102,6 +102,17 @@ impl Robot {
     }
 }
 
+/// The joint types that the format knows.
+const JOINT_TYPES: [&str; 7] = [
+    "revolute",
+    "continuous",
+    "prismatic",
+    "fixed",
+    "floating",
+    "planar",
+    "spherical",
+];
+
 /// What urdf-rs does not check, or answers with a fault of its own: that the text is XML without absurd nesting, that it
 /// is a robot, and that xacro has been run on it.
 fn check_xml(xml: &str) -> Result<(), ModelError> {
@@ -128,6 +139,16 @@ fn check_xml(xml: &str) -> Result<(), ModelError> {
                 "expected plain URDF, found <xacro:{}>: run xacro on it first",
                 node.tag_name().name()
             )));
+        }
+    }
+    let joints = (document.root_element().children()).filter(|node| node.has_tag_name("joint"));
+    for joint in joints {
+        let found = joint.attribute("type").unwrap_or("none");
+        if !JOINT_TYPES.contains(&found) {
+            return Err(ModelError::JointType {
+                joint: joint.attribute("name").unwrap_or_default().to_owned(),
+                found: found.to_owned(),
+            });
         }
     }
     Ok(())
