@@ -247,6 +247,7 @@ impl Settings {
     }
 
     fn check(&self) -> Result<(), ParameterError> {
+        self.filter.check()?;
         let tolerance = self.input.pairing_tolerance_secs;
         in_range(
             "input.pairing_tolerance_secs",

@@ -1,0 +1,136 @@
+//! A bounded buffer between two threads in which the newest data wins.
+
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// A queue of limited length: the writer never waits, and where the reader is too slow, the oldest entry is lost and
+/// counted.
+#[derive(Debug)]
+pub struct Newest<T> {
+    capacity: usize,
+    state: Mutex<State<T>>,
+    arrived: Condvar,
+}
+
+#[derive(Debug)]
+struct State<T> {
+    waiting: VecDeque<T>,
+    lost: u64,
+    closed: bool,
+}
+
+impl<T> Newest<T> {
+    /// A buffer of at most `capacity` entries (at least one).
+    pub fn new(capacity: usize) -> Self {
+        Self {
+            capacity: capacity.max(1),
+            state: Mutex::new(State {
+                waiting: VecDeque::new(),
+                lost: 0,
+                closed: false,
+            }),
+            arrived: Condvar::new(),
+        }
+    }
+
+    /// Puts an entry in, in place of the oldest where there is no room.
+    pub fn push(&self, entry: T) {
+        let mut state = self.lock();
+        if state.waiting.len() == self.capacity {
+            state.waiting.pop_front();
+            state.lost += 1;
+        }
+        state.waiting.push_back(entry);
+        self.arrived.notify_one();
+    }
+
+    /// Takes the oldest entry out, waiting for one. None after [`Newest::close`].
+    pub fn pop(&self) -> Option<T> {
+        let state = self.lock();
+        let mut state = self
+            .arrived
+            .wait_while(state, |state| state.waiting.is_empty() && !state.closed)
+            .unwrap_or_else(PoisonError::into_inner);
+        if state.closed {
+            None
+        } else {
+            state.waiting.pop_front()
+        }
+    }
+
+    /// Takes the oldest entry out, if there is one.
+    pub fn try_pop(&self) -> Option<T> {
+        self.lock().waiting.pop_front()
+    }
+
+    /// Waits for `time`, or until the buffer is closed. Says whether it is still open.
+    pub fn wait_open(&self, time: Duration) -> bool {
+        let (state, _) = self
+            .arrived
+            .wait_timeout_while(self.lock(), time, |state| !state.closed)
+            .unwrap_or_else(PoisonError::into_inner);
+        !state.closed
+    }
+
+    /// Ends the reader's waiting, now and later.
+    pub fn close(&self) {
+        self.lock().closed = true;
+        self.arrived.notify_all();
+    }
+
+    /// Whether nothing waits.
+    pub fn is_empty(&self) -> bool {
+        self.lock().waiting.is_empty()
+    }
+
+    /// How many entries were lost so far.
+    pub fn lost(&self) -> u64 {
+        self.lock().lost
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
+        // A panic elsewhere leaves the queue as it was between two calls.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_win_and_the_lost_are_counted() {
+        let buffer = Newest::new(3);
+        for entry in 0..10 {
+            buffer.push(entry);
+        }
+        assert_eq!(buffer.lost(), 7);
+        assert_eq!(
+            [buffer.pop(), buffer.pop(), buffer.pop()],
+            [Some(7), Some(8), Some(9)]
+        );
+        assert_eq!(buffer.try_pop(), None);
+    }
+
+    #[test]
+    fn closing_ends_a_waiting_reader() {
+        let buffer = Newest::<u8>::new(1);
+        std::thread::scope(|scope| {
+            let reader = scope.spawn(|| buffer.pop());
+            buffer.close();
+            assert_eq!(reader.join().unwrap(), None);
+        });
+        assert!(!buffer.wait_open(Duration::from_secs(3600)));
+    }
+
+    #[test]
+    fn what_one_thread_puts_in_another_takes_out_in_order() {
+        let buffer = Newest::new(1000);
+        std::thread::scope(|scope| {
+            scope.spawn(|| (0..1000).for_each(|entry| buffer.push(entry)));
+            let taken: Vec<_> = (0..1000).filter_map(|_| buffer.pop()).collect();
+            assert_eq!(taken, (0..1000).collect::<Vec<_>>());
+        });
+    }
+}

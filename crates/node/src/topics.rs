@@ -1,0 +1,162 @@
+//! The node at work: its topics and threads.
+
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use futures::{FutureExt, Stream, StreamExt};
+use palpate_filter::{Filter, Settings};
+use palpate_model::Robot;
+use palpate_node::{JointInput, JointMessage, MessageError, Newest, Throttle, TimedSample};
+use r2r::QosProfile;
+use r2r::sensor_msgs::msg::JointState;
+
+use crate::diagnostics::Diagnostics;
+use crate::drawing::{Easel, Pictures};
+use crate::estimation::{Estimation, Outputs, Progress};
+use crate::{messages, stopped};
+
+/// Messages that the middleware keeps for a reader that is late.
+const DEPTH: usize = 100;
+
+/// Works until asked to stop.
+pub fn run(
+    node: &mut r2r::Node,
+    robot: Robot,
+    settings: &Settings,
+    stop: &AtomicBool,
+) -> anyhow::Result<()> {
+    let robot = Arc::new(robot);
+    let filter = Filter::new(&robot, &settings.filter, settings.seed)?;
+    let samples = Arc::new(Newest::new(settings.input.buffer));
+    let easel = Arc::new(Easel::new());
+    let progress = Arc::new(Mutex::new(Progress::default()));
+
+    let estimation = Estimation::new(
+        Arc::clone(&robot),
+        filter,
+        create_outputs(node)?,
+        Arc::clone(&easel),
+        Arc::clone(&progress),
+    );
+    let pictures = create_pictures(node)?;
+    let estimating = spawn("estimation", {
+        let samples = Arc::clone(&samples);
+        move || estimation.run(&samples)
+    })?;
+    let drawing = spawn("drawing", {
+        let (robot, easel) = (Arc::clone(&robot), Arc::clone(&easel));
+        let period = Duration::from_secs_f64(1.0 / settings.viz.rate);
+        move || pictures.run(&robot, &easel, period)
+    })?;
+
+    let mut diagnostics = Diagnostics::new(node, &robot, settings, progress)?;
+    let mut reader = Reader::new(
+        node,
+        JointInput::new(robot, &settings.input),
+        Arc::clone(&samples),
+    )?;
+    while !stopped(stop) && !estimating.is_finished() && !drawing.is_finished() {
+        node.spin_once(Duration::from_millis(20));
+        reader.drain();
+        diagnostics.tell(node, &reader.input, &samples)?;
+    }
+    samples.close();
+    easel.close();
+    finish(estimating, "estimation")?;
+    finish(drawing, "drawing")
+}
+
+fn create_outputs(node: &mut r2r::Node) -> r2r::Result<Outputs> {
+    let latched = QosProfile::default().transient_local().keep_last(1);
+    Ok(Outputs {
+        pose: node.create_publisher("~/contact_pose", QosProfile::default())?,
+        wrench: node.create_publisher("~/contact_wrench", QosProfile::default())?,
+        detected: node.create_publisher("~/contact_detected", latched)?,
+    })
+}
+
+fn create_pictures(node: &mut r2r::Node) -> r2r::Result<Pictures> {
+    Ok(Pictures {
+        cloud: node.create_publisher("~/particles", QosProfile::default().keep_last(2))?,
+        markers: node.create_publisher("~/markers", QosProfile::default().keep_last(2))?,
+    })
+}
+
+type Work = JoinHandle<r2r::Result<()>>;
+
+fn spawn(
+    name: &str,
+    work: impl FnOnce() -> r2r::Result<()> + Send + 'static,
+) -> anyhow::Result<Work> {
+    let thread = thread::Builder::new().name(name.to_owned());
+    thread.spawn(work).context("cannot start a thread")
+}
+
+fn finish(work: Work, name: &'static str) -> anyhow::Result<()> {
+    match work.join() {
+        Ok(result) => result.with_context(|| format!("{name} cannot publish")),
+        Err(_) => anyhow::bail!("{name} ended early, which is a fault of this program"),
+    }
+}
+
+/// Takes both topics in. Best effort, as that reads reliable and best-effort publishers alike.
+struct Reader {
+    positions: Box<dyn Stream<Item = JointState> + Unpin>,
+    torques: Box<dyn Stream<Item = JointState> + Unpin>,
+    input: JointInput,
+    samples: Arc<Newest<TimedSample>>,
+    complaints: Throttle,
+}
+
+impl Reader {
+    fn new(
+        node: &mut r2r::Node,
+        input: JointInput,
+        samples: Arc<Newest<TimedSample>>,
+    ) -> r2r::Result<Self> {
+        let qos = QosProfile::sensor_data().keep_last(DEPTH);
+        Ok(Self {
+            positions: Box::new(node.subscribe("joint_states", qos.clone())?),
+            torques: Box::new(node.subscribe("external_torque", qos)?),
+            input,
+            samples,
+            complaints: Throttle::new(Duration::from_secs(5)),
+        })
+    }
+
+    /// Takes all that has come: r2r itself would drop the newest.
+    fn drain(&mut self) {
+        while let Some(Some(message)) = self.positions.next().now_or_never() {
+            let taken = self
+                .input
+                .position(joint_message(&message, &message.position));
+            self.hand_on(taken);
+        }
+        while let Some(Some(message)) = self.torques.next().now_or_never() {
+            let taken = self.input.torque(joint_message(&message, &message.effort));
+            self.hand_on(taken);
+        }
+    }
+
+    fn hand_on(&mut self, taken: Result<(), MessageError>) {
+        if let Err(refusal) = taken
+            && let Some(more) = self.complaints.pass(Instant::now())
+        {
+            tracing::warn!("message refused (and {more} before): {refusal}");
+        }
+        while let Some(sample) = self.input.next_sample() {
+            self.samples.push(sample);
+        }
+    }
+}
+
+fn joint_message<'a>(message: &'a JointState, values: &'a [f64]) -> JointMessage<'a> {
+    JointMessage {
+        stamp_ns: messages::nanoseconds(&message.header.stamp),
+        names: &message.name,
+        values,
+    }
+}
