@@ -115,6 +115,31 @@ pub(crate) fn short_name(type_name: &str) -> String {
     }
 }
 
+/// The definition of a standard type by its short name with those of all types nested in it, as bags carry it.
+///
+/// # Errors
+/// If it, or one of the nested types, is not among the standard ones.
+pub(crate) fn full_definition(root: &str) -> Result<String, BagError> {
+    let wrong = |reason: String| BagError::Definition {
+        type_name: root.to_owned(),
+        reason,
+    };
+    let mut text = String::new();
+    let mut names = vec![root.to_owned()];
+    let mut done = 0;
+    while let Some(name) = names.get(done).cloned() {
+        let body = standard_definition(&name)
+            .ok_or_else(|| wrong(format!("{name} is not among the standard types")))?;
+        parse_fields(&name, body, &mut names).map_err(wrong)?;
+        if done > 0 {
+            text += &format!("{}\nMSG: {name}\n", "=".repeat(80));
+        }
+        text += body;
+        done += 1;
+    }
+    Ok(text)
+}
+
 /// Text of each type by its short name.
 fn sections<'a>(root: &str, text: &'a str) -> Result<HashMap<String, &'a str>, String> {
     let mut sections = HashMap::new();

@@ -3,18 +3,24 @@
 mod bag;
 mod cdr;
 mod definition;
+mod encode;
 mod error;
 mod mcap_file;
+mod message;
 mod metadata;
+mod record;
 mod samples;
 mod source;
 mod sqlite_file;
 mod standard;
 mod value;
+mod writer;
 
 pub use bag::{Bag, Message, Topic};
 pub use cdr::{CdrError, decode};
 pub use definition::Definition;
 pub use error::BagError;
+pub use record::topics;
 pub use samples::{Recording, TopicChoice, TopicReport, Unusable, read_samples};
 pub use value::Value;
+pub use writer::BagWriter;
