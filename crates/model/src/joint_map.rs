@@ -63,3 +63,62 @@ fn join<S: AsRef<str>>(names: &[S]) -> String {
         names.join(", ")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::{Joint, JointKind};
+
+    fn robot(names: &[&str]) -> Robot {
+        let joint = |name: &&str| Joint {
+            name: (*name).to_owned(),
+            kind: JointKind::Revolute,
+            axis_in_joint: Vector3::z_axis(),
+            limits: None,
+        };
+        Robot {
+            name: "robot".to_owned(),
+            joints: names.iter().map(joint).collect(),
+            links: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn values_follow_their_names_in_any_order_and_company() {
+        let map = JointMap::new(&robot(&["a", "b", "c"]), &["c", "gripper", "a", "b"]).unwrap();
+        assert_eq!(map.pick(&[3.0, 9.0, 1.0, 2.0]).unwrap(), [1.0, 2.0, 3.0]);
+        // A value beyond the names belongs to no joint.
+        assert_eq!(
+            map.pick(&[3.0, 9.0, 1.0, 2.0, 8.0]).unwrap(),
+            [1.0, 2.0, 3.0]
+        );
+    }
+
+    #[test]
+    fn missing_joints_are_named_with_what_is_there() {
+        let error = JointMap::new(&robot(&["a", "b", "c"]), &["b", "x"]).unwrap_err();
+        let expected = "joints missing: the robot needs a, c; the message has b, x";
+        assert_eq!(error.to_string(), expected);
+        let error = JointMap::new::<&str>(&robot(&["a"]), &[]).unwrap_err();
+        assert!(error.to_string().ends_with("none"), "{error}");
+    }
+
+    #[test]
+    fn too_few_values_are_refused_with_both_numbers() {
+        let map = JointMap::new(&robot(&["a", "b"]), &["x", "b", "a"]).unwrap();
+        let error = map.pick(&[1.0, 2.0]).unwrap_err().to_string();
+        assert!(
+            error.contains("at least 3") && error.contains("found 2"),
+            "{error}"
+        );
+        assert!(map.pick(&[]).is_err());
+    }
+
+    #[test]
+    fn a_robot_without_joints_needs_nothing() {
+        let map = JointMap::new(&robot(&[]), &["a"]).unwrap();
+        assert_eq!(map.pick(&[]).unwrap(), Vec::<f64>::new());
+    }
+}

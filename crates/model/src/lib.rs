@@ -20,6 +20,7 @@ mod sample;
 mod shape;
 mod split;
 mod surface;
+mod tree;
 mod urdf;
 
 pub use clean::Cleaning;

@@ -7,8 +7,9 @@ use crate::split::split;
 use crate::{Cleaning, LinkReport, LoadOptions, MeshSource, ModelError, TriangleMesh};
 use crate::{mesh_file, shape};
 
-/// A mesh with at most this share of open edges has an inside and an outside for the winding to be checked by.
-const NEARLY_CLOSED: f64 = 0.1;
+/// The area vectors of a closed surface sum to zero, whatever its triangles. A surface whose sum is at most this share
+/// of its area (a box without its lid has a fifth) has an inside and an outside for the winding to be checked by.
+const NEARLY_CLOSED: f64 = 0.25;
 
 /// Builds a link's mesh in the link's frame: each element loaded, scaled, moved by its origin, cleaned and turned
 /// outwards; then all of them as one, split.
@@ -106,10 +107,10 @@ fn in_own_frame(
 }
 
 fn faces_inwards(mesh: &TriangleMesh) -> bool {
-    let edges = mesh.edges();
-    let nearly_closed = edges.open as f64 <= NEARLY_CLOSED * edges.total as f64;
+    let area = mesh.area();
+    let nearly_closed = mesh.area_vector().norm() <= NEARLY_CLOSED * area;
     // A flat sheet has no volume but for rounding.
-    nearly_closed && mesh.signed_volume() < -1e-6 * mesh.area().powf(1.5)
+    nearly_closed && mesh.signed_volume() < -1e-6 * area.powf(1.5)
 }
 
 fn positive<const N: usize>(name: &str, values: &[f64; N]) -> Result<[f64; N], ModelError> {

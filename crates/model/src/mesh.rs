@@ -37,12 +37,19 @@ impl TriangleMesh {
 
     /// Area of all triangles, m².
     pub fn area(&self) -> f64 {
-        (0..self.triangles.len())
-            .map(|triangle| {
-                let [a, b, c] = self.corners(triangle);
-                (b - a).cross(&(c - a)).norm() / 2.0
-            })
-            .sum()
+        self.area_vectors().map(|vector| vector.norm()).sum()
+    }
+
+    /// Sum over the triangles of area times normal, m²; zero for a closed mesh.
+    pub(crate) fn area_vector(&self) -> Vector3<f64> {
+        self.area_vectors().sum()
+    }
+
+    fn area_vectors(&self) -> impl Iterator<Item = Vector3<f64>> {
+        (0..self.triangles.len()).map(|triangle| {
+            let [a, b, c] = self.corners(triangle);
+            (b - a).cross(&(c - a)) / 2.0
+        })
     }
 
     /// Diagonal of the bounding box, m; zero for a mesh without vertices.
@@ -120,4 +127,68 @@ pub struct EdgeCount {
     /// Edges whose triangles do not run along them equally often both ways: neighbours disagree on which side is
     /// outside, or an odd number of triangles meet.
     pub inconsistent: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::cuboid;
+
+    fn cube() -> TriangleMesh {
+        cuboid(&Vector3::repeat(2.0))
+    }
+
+    #[test]
+    fn volume_does_not_depend_on_the_place_and_changes_sign_when_flipped() {
+        let mut mesh = cube();
+        mesh.transform(&Isometry3::new(
+            Vector3::new(5.0, -7.0, 11.0),
+            Vector3::new(0.3, 0.2, 0.1),
+        ));
+        assert!((mesh.signed_volume() - 8.0).abs() < 1e-9);
+        assert!(mesh.area_vector().norm() < 1e-9);
+        mesh.flip();
+        assert!((mesh.signed_volume() + 8.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_reflected_mesh_still_faces_outwards() {
+        for scale in [[-1.0, 1.0, 1.0], [-1.0, -2.0, 1.0], [-1.0, -1.0, -1.0]] {
+            let mut mesh = cube();
+            mesh.scale(&scale.into());
+            let volume: f64 = 8.0
+                * scale
+                    .iter()
+                    .map(|factor: &f64| factor.abs())
+                    .product::<f64>();
+            assert!((mesh.signed_volume() - volume).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn edges_tell_holes_and_disagreement() {
+        let closed = EdgeCount {
+            total: 18,
+            open: 0,
+            inconsistent: 0,
+        };
+        assert_eq!(cube().edges(), closed);
+        let mut holed = cube();
+        holed.triangles.pop();
+        assert_eq!(holed.edges(), EdgeCount { open: 3, ..closed });
+        let mut disagreeing = cube();
+        disagreeing.triangles[4].swap(0, 1);
+        let expected = EdgeCount {
+            inconsistent: 3,
+            ..closed
+        };
+        assert_eq!(disagreeing.edges(), expected);
+    }
+
+    #[test]
+    fn a_mesh_without_vertices_has_no_measures() {
+        let empty = TriangleMesh::default();
+        let measures = (empty.extent(), empty.area(), empty.signed_volume());
+        assert_eq!(measures, (0.0, 0.0, 0.0));
+    }
 }

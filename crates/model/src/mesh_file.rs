@@ -24,3 +24,6 @@ pub(crate) fn parse(uri: &str, bytes: &[u8]) -> Result<TriangleMesh, ModelError>
         }),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -116,3 +116,98 @@ impl MeshSource for EmbeddedMeshes {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    fn write(dir: &Path, name: &str) {
+        let path = dir.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, name).unwrap();
+    }
+
+    /// Files whose content is their own path in the folder.
+    fn folder(names: &[&str]) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        names.iter().for_each(|name| write(dir.path(), name));
+        dir
+    }
+
+    fn read(files: &MeshFiles, uri: &str) -> String {
+        String::from_utf8(files.read(uri).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn paths_are_relative_to_the_urdf_or_absolute() {
+        let dir = folder(&["urdf/meshes/a.stl"]);
+        let files = MeshFiles::new(dir.path().join("urdf"), Vec::new(), Vec::new());
+        let absolute = dir.path().join("urdf/meshes/a.stl").display().to_string();
+        for uri in [
+            "meshes/a.stl",
+            "../urdf/meshes/a.stl",
+            "file://meshes/a.stl",
+            &absolute,
+            &format!("file://{absolute}"),
+        ] {
+            assert_eq!(read(&files, uri), "urdf/meshes/a.stl", "{uri}");
+        }
+    }
+
+    #[test]
+    fn packages_are_found_in_each_place() {
+        let names = [
+            "given/one/a.stl",
+            "two/b.stl",
+            "ament/share/three/c.stl",
+            "four/urdf/deep/robot.urdf",
+            "four/d.stl",
+        ];
+        let dir = folder(&names);
+        let at = |name: &str| dir.path().join(name);
+        let packages = vec![at("given"), at("two")];
+        let files = MeshFiles::new(
+            at("four/urdf/deep"),
+            packages,
+            vec![at("none"), at("ament")],
+        );
+        assert_eq!(read(&files, "package://one/a.stl"), names[0]);
+        assert_eq!(read(&files, "package://two/b.stl"), names[1]);
+        assert_eq!(read(&files, "package://three/c.stl"), names[2]);
+        assert_eq!(read(&files, "package://four/d.stl"), names[4]);
+    }
+
+    #[test]
+    fn given_folders_come_before_ament_prefixes() {
+        let dir = folder(&["given/one/a.stl", "ament/share/one/a.stl"]);
+        let at = |name: &str| dir.path().join(name);
+        let files = MeshFiles::new(PathBuf::new(), vec![at("given")], vec![at("ament")]);
+        assert_eq!(read(&files, "package://one/a.stl"), "given/one/a.stl");
+    }
+
+    #[test]
+    fn what_is_absent_is_said_with_the_places_searched() {
+        let files = MeshFiles::new("a".into(), vec!["b".into()], vec!["c".into()]);
+        let error = files.read("package://robot/d.stl").unwrap_err().to_string();
+        let searched = ["b/robot/d.stl", "c/share/robot/d.stl"];
+        assert!(searched.iter().all(|path| error.contains(path)), "{error}");
+        let error = files.read("https://robot/d.stl").unwrap_err().to_string();
+        assert!(error.contains("https://robot/d.stl"), "{error}");
+        // A folder is no mesh.
+        assert!(
+            MeshFiles::new(".".into(), Vec::new(), Vec::new())
+                .read("")
+                .is_err()
+        );
+    }
+
+    #[test]
+    fn embedded_meshes_are_found_by_their_whole_name() {
+        let meshes = EmbeddedMeshes(&[("meshes/a.obj", b"a"), ("b.obj", b"b")]);
+        assert_eq!(meshes.read("b.obj").unwrap(), b"b");
+        let error = meshes.read("a.obj").unwrap_err().to_string();
+        assert!(error.contains("meshes/a.obj"), "{error}");
+    }
+}

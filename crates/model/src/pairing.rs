@@ -99,3 +99,108 @@ impl Pairing {
         self.torques.clear();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drain(pairing: &mut Pairing) -> Vec<(i64, f64, f64)> {
+        std::iter::from_fn(|| pairing.next_sample())
+            .map(|sample| {
+                (
+                    sample.stamp_ns,
+                    sample.position[0],
+                    sample.external_torque[0],
+                )
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_torque_takes_the_nearest_position_and_keeps_its_own_stamp() {
+        let mut pairing = Pairing::new(5);
+        for stamp in [0, 10, 20, 30] {
+            pairing.push_position(stamp, vec![stamp as f64]);
+        }
+        for stamp in [4, 16, 20] {
+            pairing.push_torque(stamp, vec![-stamp as f64]);
+        }
+        let expected = [(4, 0.0, -4.0), (16, 20.0, -16.0), (20, 20.0, -20.0)];
+        assert_eq!(drain(&mut pairing), expected);
+        assert_eq!(pairing.losses().torque_without_position, 0);
+    }
+
+    #[test]
+    fn the_order_in_which_topics_arrive_does_not_matter() {
+        let positions = [0, 10, 20, 30, 40];
+        let torques = [1, 12, 18, 39];
+        let mut together = Pairing::new(5);
+        for stamp in positions {
+            together.push_position(stamp, vec![stamp as f64]);
+        }
+        for stamp in torques {
+            together.push_torque(stamp, vec![0.0]);
+        }
+        let expected = drain(&mut together);
+        assert_eq!(expected.len(), 4);
+
+        let mut torques_first = Pairing::new(5);
+        for stamp in torques {
+            torques_first.push_torque(stamp, vec![0.0]);
+        }
+        let mut found = Vec::new();
+        for stamp in positions {
+            torques_first.push_position(stamp, vec![stamp as f64]);
+            found.extend(drain(&mut torques_first));
+        }
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn a_torque_waits_until_a_position_at_or_after_it_is_known() {
+        let mut pairing = Pairing::new(5);
+        pairing.push_position(0, vec![1.0]);
+        pairing.push_torque(3, vec![2.0]);
+        assert_eq!(pairing.next_sample(), None);
+        pairing.push_position(4, vec![3.0]);
+        assert_eq!(drain(&mut pairing), [(3, 3.0, 2.0)]);
+    }
+
+    #[test]
+    fn a_torque_too_far_from_any_position_is_counted_and_skipped() {
+        let mut pairing = Pairing::new(5);
+        pairing.push_position(0, vec![1.0]);
+        pairing.push_position(100, vec![2.0]);
+        pairing.push_torque(50, vec![3.0]);
+        pairing.push_torque(97, vec![4.0]);
+        assert_eq!(drain(&mut pairing), [(97, 2.0, 4.0)]);
+        assert_eq!(pairing.losses().torque_without_position, 1);
+    }
+
+    #[test]
+    fn what_waits_is_bounded_and_what_falls_out_is_counted() {
+        let mut pairing = Pairing::new(5);
+        for stamp in 0..300 {
+            pairing.push_torque(stamp, vec![0.0]);
+        }
+        assert_eq!(pairing.losses().torque_without_position, 300 - 256);
+        let mut pairing = Pairing::new(5);
+        for stamp in 0..300 {
+            pairing.push_position(stamp, vec![0.0]);
+        }
+        assert_eq!(pairing.losses().position_without_torque, 300 - 256);
+    }
+
+    #[test]
+    fn clearing_forgets_what_waits_but_not_the_counts() {
+        let mut pairing = Pairing::new(5);
+        pairing.push_position(0, vec![1.0]);
+        pairing.push_position(100, vec![2.0]);
+        pairing.push_torque(50, vec![3.0]);
+        assert_eq!(pairing.next_sample(), None);
+        pairing.push_torque(100, vec![3.0]);
+        pairing.clear();
+        assert_eq!(pairing.next_sample(), None);
+        assert_eq!(pairing.losses().torque_without_position, 1);
+    }
+}

@@ -98,3 +98,66 @@ fn revolve(profile: &[(f64, f64)], pole: f64, segments: usize) -> TriangleMesh {
         triangles,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+
+    fn assert_shape(mesh: &TriangleMesh, area: f64, volume: f64) {
+        let edges = mesh.edges();
+        assert_eq!((edges.open, edges.inconsistent), (0, 0));
+        // Corners lie on the true surface, so the triangles lie inside it.
+        let found = (mesh.area() / area, mesh.signed_volume() / volume);
+        assert!((0.999..1.000001).contains(&found.0), "{found:?}");
+        assert!((0.999..1.000001).contains(&found.1), "{found:?}");
+    }
+
+    #[test]
+    fn shapes_are_closed_face_outwards_and_have_the_area_and_volume_of_the_formulas() {
+        let (r, l, fine) = (0.3, 0.5, 0.01);
+        let size = Vector3::new(0.1, 0.2, 0.3);
+        assert_shape(&cuboid(&size), 0.22, 0.006);
+        assert_shape(
+            &cylinder(r, l, fine),
+            2.0 * PI * r * (r + l),
+            PI * r * r * l,
+        );
+        assert_shape(
+            &sphere(r, fine),
+            4.0 * PI * r * r,
+            4.0 / 3.0 * PI * r.powi(3),
+        );
+        assert_shape(
+            &capsule(r, l, fine),
+            4.0 * PI * r * r + 2.0 * PI * r * l,
+            4.0 / 3.0 * PI * r.powi(3) + PI * r * r * l,
+        );
+    }
+
+    #[test]
+    fn shapes_reach_as_far_as_they_should() {
+        let highest = |mesh: &TriangleMesh, axis: usize| {
+            let values = mesh.vertices.iter().map(|vertex| vertex[axis]);
+            values.fold(f64::NEG_INFINITY, f64::max)
+        };
+        for (mesh, x, z) in [
+            (cuboid(&Vector3::new(0.2, 0.4, 0.6)), 0.1, 0.3),
+            (cylinder(0.3, 0.5, 0.01), 0.3, 0.25),
+            (sphere(0.3, 0.01), 0.3, 0.3),
+            (capsule(0.3, 0.5, 0.01), 0.3, 0.55),
+        ] {
+            assert!((highest(&mesh, 0) - x).abs() < 1e-12);
+            assert!((highest(&mesh, 2) - z).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn very_small_and_very_large_shapes_are_bounded() {
+        for radius in [1e-9, 1e9] {
+            let triangles = sphere(radius, 0.02).triangles.len();
+            assert!((500..200_000).contains(&triangles), "{triangles}");
+        }
+    }
+}

@@ -104,3 +104,69 @@ fn divide_quad(mesh: &TriangleMesh, [a, b, c, d]: [u32; 4], out: &mut Vec<[u32; 
         out.extend([[a, b, d], [b, c, d]]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::shape;
+
+    fn longest_edge(mesh: &TriangleMesh) -> f64 {
+        let sides = (0..mesh.triangles.len()).flat_map(|triangle| {
+            let [a, b, c] = mesh.corners(triangle);
+            [(b - a).norm(), (c - b).norm(), (a - c).norm()]
+        });
+        sides.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn splitting_bounds_edges_and_keeps_the_surface_closed() {
+        let shapes = [
+            shape::cuboid(&Vector3::new(0.3, 0.011, 0.1)),
+            shape::cylinder(0.05, 0.7, f64::INFINITY),
+            shape::sphere(0.2, f64::INFINITY),
+        ];
+        for whole in shapes {
+            for max_edge in [0.03, 0.02, 0.007] {
+                let mut mesh = whole.clone();
+                let halved = split(&mut mesh, max_edge).unwrap();
+                assert!(halved > 0);
+                assert!(longest_edge(&mesh) <= max_edge);
+                // A vertex inside a neighbour's edge would open it.
+                let edges = mesh.edges();
+                assert_eq!((edges.open, edges.inconsistent), (0, 0));
+                assert!((mesh.area() - whole.area()).abs() < 1e-9 * whole.area());
+                assert!((mesh.signed_volume() - whole.signed_volume()).abs() < 1e-12);
+                assert_eq!(mesh.vertices.len(), whole.vertices.len() + halved);
+            }
+        }
+    }
+
+    #[test]
+    fn fine_triangles_stay_as_they_are() {
+        let whole = shape::cuboid(&Vector3::repeat(1.0));
+        let mut mesh = whole.clone();
+        assert_eq!(split(&mut mesh, f64::INFINITY).unwrap(), 0);
+        assert_eq!(mesh, whole);
+    }
+
+    #[test]
+    fn a_mesh_in_millimetres_is_refused() {
+        let mut mesh = shape::cuboid(&Vector3::repeat(200.0));
+        let error = split(&mut mesh, 0.02).unwrap_err().to_string();
+        assert!(
+            error.contains("346.4") && error.contains("scale"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn coordinates_beyond_rounding_end_in_an_error() {
+        for far in [1e20, f64::MAX] {
+            let mut mesh = shape::cuboid(&Vector3::repeat(1.0));
+            mesh.vertices[0].x = far;
+            assert!(split(&mut mesh, 0.02).is_err());
+        }
+    }
+}
