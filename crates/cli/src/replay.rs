@@ -1,0 +1,216 @@
+//! `palpate replay`: a bag through the filter.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use palpate_bag::{Bag, Recording, TopicChoice, TopicReport, read_samples};
+use palpate_filter::{ContactStatus, Filter, Settings};
+use palpate_model::Robot;
+
+use crate::last_second::LastSecond;
+use crate::robot_args::RobotArgs;
+use crate::track::{Track, track};
+use crate::{estimates_csv, progress, table};
+
+/// Estimate the contacts of a recorded bag
+///
+/// Reads a rosbag2 folder (MCAP or sqlite3), a lone .mcap or a lone .db3, pairs joint positions with external joint
+/// torques, and runs the filter on every pair. The same bag, parameters and seed give the same estimates, whatever the
+/// number of threads.
+#[derive(Args)]
+pub struct Replay {
+    /// The bag: a rosbag2 folder, an .mcap or a .db3
+    bag: PathBuf,
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// Parameters, as a ROS 2 parameter file; unknown keys are refused [default: built-in parameters]
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Seed of the random streams [default: `seed` of the parameters, 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Write one row a sample: stamp in ns, status, link, point (m) and normal in the root frame, force (N), stiffness
+    /// (N/m), standard deviation of the point (m), probability of the mode [default: not written]
+    #[arg(long, value_name = "FILE.csv")]
+    estimates: Option<PathBuf>,
+    /// Write a bag with samples and estimates, for Foxglove, Rerun or RViz [default: not written]
+    #[arg(long, value_name = "FILE.mcap")]
+    out: Option<PathBuf>,
+    /// Topic of the joint positions [default: the only one that fits]
+    #[arg(long, value_name = "TOPIC")]
+    positions: Option<String>,
+    /// Topic of the external joint torques, gravity removed [default: the only one that fits]
+    #[arg(long, value_name = "TOPIC")]
+    torques: Option<String>,
+    /// Number of threads; 0 for one a core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Print no table and no progress
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+impl Replay {
+    /// Runs the command.
+    pub fn run(&self) -> Result<()> {
+        let start = Instant::now();
+        let mut settings = match &self.config {
+            Some(path) => Settings::read(path).with_context(|| path.display().to_string())?,
+            None => Settings::default(),
+        };
+        settings.seed = self.seed.unwrap_or(settings.seed);
+        set_threads(self.threads)?;
+        let (robot, _) = (self.robot).load(&settings.robot, &settings.robot.load_options())?;
+        let recording = self.read(&robot, &settings)?;
+        let mut filter = Filter::new(&robot, &settings.filter, settings.seed)?;
+        let bar = progress::bar(recording.samples.len(), "replay", self.quiet);
+        let jump_secs = settings.input.time_jump_secs;
+        let track = track(
+            &mut filter,
+            robot.dof(),
+            &recording.samples,
+            jump_secs,
+            |_, _| {
+                bar.inc(1);
+                Ok(())
+            },
+        )?;
+        bar.finish_and_clear();
+        if let Some(path) = &self.estimates {
+            estimates_csv::write(path, &robot, &track.estimates)?;
+        }
+        if !self.quiet {
+            let wall_secs = start.elapsed().as_secs_f64();
+            table::print(&table::facts(&facts(&robot, &recording, &track, wall_secs)))?;
+        }
+        Ok(())
+    }
+
+    fn read(&self, robot: &Robot, settings: &Settings) -> Result<Recording> {
+        let whose = || format!("bag {}", self.bag.display());
+        let bag = Bag::open(&self.bag).with_context(whose)?;
+        let choice = TopicChoice {
+            positions: self.positions.clone(),
+            torques: self.torques.clone(),
+        };
+        let tolerance_ns = (settings.input.pairing_tolerance_secs * 1e9).round() as i64;
+        let recording = read_samples(&bag, robot, &choice, tolerance_ns).with_context(whose)?;
+        for topic in [&recording.positions, &recording.torques] {
+            if let Some(reason) = &topic.unusable.first_reason {
+                let count = topic.unusable.total();
+                tracing::warn!(
+                    "{}: {count} messages unusable, the first: {reason}",
+                    topic.topic
+                );
+            }
+        }
+        Ok(recording)
+    }
+}
+
+/// Sets the number of threads of everything that follows; 0 for one a core.
+pub fn set_threads(threads: usize) -> Result<()> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .context("cannot start threads")
+}
+
+fn facts(
+    robot: &Robot,
+    recording: &Recording,
+    track: &Track,
+    wall_secs: f64,
+) -> Vec<(&'static str, String)> {
+    let counts = track.counts;
+    let losses = recording.losses;
+    let share = |status| {
+        format!(
+            "{} {:.1} %",
+            ContactStatus::word(status),
+            100.0 * track.share(status)
+        )
+    };
+    let span_secs = track.span_secs();
+    let mut facts = vec![
+        ("joint positions", told(&recording.positions)),
+        ("external torques", told(&recording.torques)),
+        (
+            "unpaired",
+            format!(
+                "{} torques without position, {} positions without torque",
+                losses.torque_without_position, losses.position_without_torque
+            ),
+        ),
+        (
+            "samples",
+            format!(
+                "{} used, {span_secs:.2} s; refused: {} for their stamp, {} not finite, {} of wrong length",
+                counts.admitted, counts.stamp_not_after, counts.not_finite, counts.wrong_length
+            ),
+        ),
+        (
+            "status",
+            [
+                ContactStatus::NoContact,
+                ContactStatus::Ambiguous,
+                ContactStatus::Located,
+            ]
+            .map(share)
+            .join(", "),
+        ),
+    ];
+    if track.restarts > 0 {
+        facts.push(("time started anew", format!("{} times", track.restarts)));
+    }
+    facts.extend(last_second_facts(robot, track));
+    let filter_secs = track.filter_time.as_secs_f64();
+    facts.push((
+        "time taken",
+        format!(
+            "{wall_secs:.2} s in all; filter {filter_secs:.2} s, {:.1} × real time",
+            span_secs / filter_secs.max(1e-9)
+        ),
+    ));
+    facts
+}
+
+fn told(topic: &TopicReport) -> String {
+    let unusable = &topic.unusable;
+    let mut told = format!("{}, {} messages", topic.topic, topic.messages);
+    let causes = [
+        (unusable.undecodable, "undecodable"),
+        (unusable.names_missing, "without all joints"),
+        (unusable.wrong_length, "of wrong length"),
+        (unusable.not_finite, "not finite"),
+    ];
+    for (count, cause) in causes.iter().filter(|(count, _)| *count > 0) {
+        told += &format!(", {count} {cause}");
+    }
+    told
+}
+
+fn last_second_facts(robot: &Robot, track: &Track) -> Vec<(&'static str, String)> {
+    let Some(last) = LastSecond::of(&track.estimates) else {
+        return vec![("last second", "no contact".to_owned())];
+    };
+    let p = last.point_in_root;
+    vec![
+        (
+            "last second: link",
+            format!(
+                "{} ({:.0} % of estimates)",
+                robot.links[last.link].name,
+                100.0 * last.share
+            ),
+        ),
+        (
+            "position",
+            format!("{:.4}, {:.4}, {:.4} m in {}", p.x, p.y, p.z, robot.root()),
+        ),
+        ("standard deviation", format!("{:.1} mm", 1e3 * last.std)),
+        ("force", format!("{:.2} N", last.force)),
+    ]
+}
