@@ -83,24 +83,25 @@ impl Bag {
         let mut warnings = Vec::new();
         let mut topics = Topics::default();
         let mut files = Vec::new();
+        let mut damage = None;
         for path in metadata::files_of(path, &mut warnings)? {
             let file = BagFile::open(path)?;
             let before = topics.messages();
             let faults = file.visit(&mut topics)?;
             let read = topics.messages() - before;
-            if let (0, Some(fault)) = (read, faults.first()) {
-                return Err(BagError::Damaged {
-                    path: file.path,
-                    reason: fault.clone(),
-                });
-            }
             let path = file.path.display();
             warnings.extend(
                 faults.iter().map(|fault| {
                     format!("{path}: {fault}; {read} messages of this file can be read")
                 }),
             );
+            if let Some(reason) = faults.into_iter().next() {
+                damage.get_or_insert((file.path.clone(), reason));
+            }
             files.push(file);
+        }
+        if let (0, Some((path, reason))) = (topics.messages(), damage) {
+            return Err(BagError::Damaged { path, reason });
         }
         for warning in &warnings {
             tracing::warn!("{warning}");
@@ -287,29 +288,38 @@ enum Format {
 impl BagFile {
     /// Tells the format by the first bytes, not by the name.
     fn open(path: PathBuf) -> Result<Self, BagError> {
-        let failed = |source| BagError::File {
+        let format = Self::format(&path).map_err(|source| BagError::File {
             path: path.clone(),
             source,
-        };
-        let start = first_bytes(File::open(&path).map_err(failed)?).map_err(failed)?;
-        let format = if start.starts_with(SQLITE_MAGIC) {
-            Format::Sqlite
-        } else if start.starts_with(&ZSTD_MAGIC) {
-            let decoder = || zstd::Decoder::new(File::open(&path)?);
-            let start = decoder().and_then(first_bytes).map_err(failed)?;
-            if start.starts_with(SQLITE_MAGIC) {
-                let mut unpacked = NamedTempFile::new().map_err(failed)?;
-                decoder()
-                    .and_then(|mut decoder| io::copy(&mut decoder, &mut unpacked))
-                    .map_err(failed)?;
-                Format::CompressedSqlite(unpacked)
-            } else {
-                Format::CompressedMcap
-            }
-        } else {
-            Format::Mcap
-        };
-        Ok(Self { path, format })
+        })?;
+        match format {
+            Ok(format) => Ok(Self { path, format }),
+            Err(found) => Err(BagError::NotABag { path, found }),
+        }
+    }
+
+    /// The format, or else what the file is instead.
+    fn format(path: &Path) -> io::Result<Result<Format, String>> {
+        let start = first_bytes(File::open(path)?)?;
+        if start.starts_with(mcap::MAGIC) {
+            return Ok(Ok(Format::Mcap));
+        }
+        if start.starts_with(SQLITE_MAGIC) {
+            return Ok(Ok(Format::Sqlite));
+        }
+        if !start.starts_with(&ZSTD_MAGIC) {
+            return Ok(Err(describe(&start)));
+        }
+        let start = first_bytes(zstd::Decoder::new(File::open(path)?)?)?;
+        if start.starts_with(mcap::MAGIC) {
+            return Ok(Ok(Format::CompressedMcap));
+        }
+        if !start.starts_with(SQLITE_MAGIC) {
+            return Ok(Err(format!("compressed, {}", describe(&start))));
+        }
+        let mut unpacked = NamedTempFile::new()?;
+        io::copy(&mut zstd::Decoder::new(File::open(path)?)?, &mut unpacked)?;
+        Ok(Ok(Format::CompressedSqlite(unpacked)))
     }
 
     /// Shows the file to `visitor`; returns what is wrong with it.
@@ -338,6 +348,16 @@ impl BagFile {
                 source,
             }),
         }
+    }
+}
+
+fn describe(start: &[u8]) -> String {
+    if start.is_empty() {
+        "an empty file".to_owned()
+    } else if start.starts_with(b"#ROSBAG") {
+        "a bag of ROS 1, which cannot be read".to_owned()
+    } else {
+        format!("a file that begins with the bytes {start:02x?}")
     }
 }
 

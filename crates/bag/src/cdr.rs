@@ -190,3 +190,139 @@ fn size(primitive: Primitive) -> usize {
         Primitive::Int64 | Primitive::UInt64 | Primitive::Float64 => 8,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn definition(text: &str) -> Definition {
+        Definition::parse("pkg/msg/Root", text).unwrap()
+    }
+
+    fn value<'d>(fields: Vec<(&'d str, Value<'d>)>) -> Value<'d> {
+        Value::Message(fields)
+    }
+
+    /// A byte, then a 4-byte number, a byte, an 8-byte number, a byte, a string, a 2-byte number.
+    const ALIGNED: &str = "bool a\nint32 b\nint8 c\nfloat64 d\nuint8 e\nstring f\nuint16 g";
+
+    fn aligned_bytes(little_endian: bool) -> Vec<u8> {
+        let mut bytes = vec![0, u8::from(little_endian), 0, 0];
+        let mut push = |number: &[u8]| {
+            let mut number = number.to_vec();
+            if !little_endian {
+                number.reverse();
+            }
+            bytes.extend(number);
+        };
+        for part in [
+            &[1][..],
+            &[0xaa; 3],
+            &(-7_i32).to_le_bytes(),
+            &[0xff],
+            &[0xaa; 7],
+            &1.5_f64.to_le_bytes(),
+            &[9],
+            &[0xaa; 3],
+            &3_u32.to_le_bytes(),
+        ] {
+            push(part);
+        }
+        bytes.extend(b"ab\0");
+        bytes.push(0xaa);
+        let last = 513_u16;
+        bytes.extend(if little_endian {
+            last.to_le_bytes()
+        } else {
+            last.to_be_bytes()
+        });
+        bytes
+    }
+
+    #[test]
+    fn numbers_are_aligned_from_after_the_encapsulation_in_both_byte_orders() {
+        let definition = definition(ALIGNED);
+        let expected = value(vec![
+            ("a", Value::Bool(true)),
+            ("b", Value::Int(-7)),
+            ("c", Value::Int(-1)),
+            ("d", Value::Float(1.5)),
+            ("e", Value::UInt(9)),
+            ("f", Value::Text("ab".to_owned())),
+            ("g", Value::UInt(513)),
+        ]);
+        for little_endian in [true, false] {
+            let bytes = aligned_bytes(little_endian);
+            assert_eq!(decode(&definition, &bytes).as_ref(), Ok(&expected));
+        }
+    }
+
+    #[test]
+    fn every_shorter_message_is_refused() {
+        let definition = definition(ALIGNED);
+        let bytes = aligned_bytes(true);
+        for length in 0..bytes.len() {
+            let refusal = decode(&definition, &bytes[..length]).unwrap_err();
+            match refusal {
+                CdrError::Encapsulation { found } => assert!(found.len() < 4),
+                CdrError::TooShort {
+                    at,
+                    expected,
+                    found,
+                    ..
+                } => assert!(expected > found && at + found == length - 4),
+                CdrError::TooDeep { .. } => panic!("{length}"),
+            }
+        }
+    }
+
+    #[test]
+    fn arrays_and_nested_messages_follow_their_counts() {
+        let definition = definition(
+            "Pair[] pairs\nuint8[2] raw\nEmpty e\nstring[] s\n===\nMSG: pkg/Pair\nint8 x\nint16 y\n===\nMSG: pkg/Empty\n",
+        );
+        let mut bytes = vec![0, 1, 0, 0];
+        bytes.extend([2, 0, 0, 0]);
+        bytes.extend([1, 0, 2, 0]);
+        bytes.extend([3, 0, 4, 0]);
+        bytes.extend([7, 8]); // raw
+        bytes.extend([0]); // the empty message's byte
+        bytes.extend([0]); // padding
+        bytes.extend([1, 0, 0, 0, 0, 0, 0, 0]); // one string without even its zero
+        let pair = |x, y| value(vec![("x", Value::Int(x)), ("y", Value::Int(y))]);
+        let decoded = decode(&definition, &bytes).unwrap();
+        let pairs = Value::List(vec![pair(1, 2), pair(3, 4)]);
+        assert_eq!(decoded.get("pairs"), Some(&pairs));
+        assert_eq!(decoded.get("raw"), Some(&Value::Bytes(vec![7, 8])));
+        assert_eq!(decoded.get("s").and_then(Value::texts), Some(vec![""]));
+    }
+
+    #[test]
+    fn a_huge_count_is_refused_before_anything_is_allocated() {
+        for text in ["float64[] a", "string[] a", "uint8[] a", "string a"] {
+            let definition = definition(text);
+            let bytes = [0, 1, 0, 0, 0xff, 0xff, 0xff, 0xff, 1, 2, 3, 4];
+            let refusal = decode(&definition, &bytes).unwrap_err();
+            let CdrError::TooShort { expected, .. } = refusal else {
+                panic!("{refusal}");
+            };
+            assert!(expected >= u32::MAX as usize, "{text}");
+        }
+    }
+
+    #[test]
+    fn endless_nesting_is_refused() {
+        let definition = definition("Root again");
+        let refusal = decode(&definition, &[0, 1, 0, 0, 0]);
+        assert_eq!(refusal, Err(CdrError::TooDeep { limit: DEPTH }));
+    }
+
+    #[test]
+    fn other_encodings_are_refused() {
+        let refusal = decode(&definition("bool a"), &[0, 3, 0, 0, 1]).unwrap_err();
+        assert_eq!(
+            refusal.to_string(),
+            "expected the encapsulation 00 00 or 00 01 of plain CDR, found [00, 03, 00, 00]"
+        );
+    }
+}

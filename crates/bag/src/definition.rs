@@ -176,7 +176,7 @@ fn parse_fields(owner: &str, body: &str, names: &mut Vec<String>) -> Result<Vec<
     let mut fields = Vec::new();
     for line in body.lines() {
         let line = line.trim();
-        if line.is_empty() || line.starts_with('#') || line.starts_with("@verbatim") {
+        if line.is_empty() || line.starts_with('#') {
             continue;
         }
         let unclear = || format!("expected \"type name\" in {owner}, found \"{line}\"");
@@ -258,4 +258,108 @@ fn index_of(name: String, names: &mut Vec<String>) -> usize {
             names.push(name);
             names.len() - 1
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Definition, String> {
+        Definition::parse("pkg/msg/Root", text).map_err(|error| error.to_string())
+    }
+
+    fn field(name: &str, element: Element, count: Count) -> Field {
+        Field {
+            name: name.to_owned(),
+            element,
+            count,
+        }
+    }
+
+    const F64: Element = Element::Primitive(Primitive::Float64);
+
+    #[test]
+    fn every_kind_of_line_is_understood() {
+        let text = "# a comment\n\
+            float64 plain\n\
+            float64 with_default 1.5 # and a comment\n\
+            float64[3] fixed [1.0, 2.0, 3.0]\n\
+            \tfloat64[]   open\r\n\
+            float64[<=5] bounded\n\
+            string<=10[<=5] names\n\
+            string greeting \"a = b # c\"\n\
+            int32 A_CONSTANT=5\n\
+            string ANOTHER = \"x\"\n";
+        let expected = vec![
+            field("plain", F64, Count::One),
+            field("with_default", F64, Count::One),
+            field("fixed", F64, Count::Fixed(3)),
+            field("open", F64, Count::Sequence),
+            field("bounded", F64, Count::Sequence),
+            field("names", Element::Text, Count::Sequence),
+            field("greeting", Element::Text, Count::One),
+        ];
+        assert_eq!(parse(text).unwrap().types, vec![expected]);
+    }
+
+    #[test]
+    fn nested_types_are_found_by_every_way_of_naming_them() {
+        let text = "Header header\nInner[] a\npkg/Inner b\npkg/msg/Inner c\ngeometry_msgs/Point d\n\
+            =====\nMSG: pkg/Inner\nfloat64 x\n\
+            ================\nMSG: geometry_msgs/Point\nfloat64 only_x\n";
+        let types = parse(text).unwrap().types;
+        let elements: Vec<_> = types[0].iter().map(|field| field.element).collect();
+        let [header, inner, point] = [1, 2, 3].map(Element::Message);
+        assert_eq!(elements, [header, inner, inner, inner, point]);
+        assert_eq!(types[2], [field("x", F64, Count::One)]);
+        // What the bag says goes before what is known here.
+        assert_eq!(types[3], [field("only_x", F64, Count::One)]);
+        assert_eq!(
+            types[1][1].name, "frame_id",
+            "the header came from the standard types"
+        );
+    }
+
+    #[test]
+    fn an_empty_message_has_one_byte() {
+        let types = parse("# nothing\nint32 A=1\n").unwrap().types;
+        assert_eq!(types[0].len(), 1);
+        assert_eq!(types[0][0].element, Element::Primitive(Primitive::UInt8));
+    }
+
+    #[test]
+    fn refusals_name_what_was_found() {
+        for (text, reason) in [
+            ("nonsense", "found \"nonsense\""),
+            ("float64 ?", "found \"float64 ?\""),
+            (
+                "float64[x] a",
+                "array size above zero, found \"float64[x]\"",
+            ),
+            (
+                "float64[0] a",
+                "array size above zero, found \"float64[0]\"",
+            ),
+            ("Other a", "nested type pkg/Other is not defined"),
+            ("wstring a", "wstring, which is not supported"),
+            ("float64 a\n====\nfloat64 b", "found \"float64 b\""),
+        ] {
+            let error = parse(text).unwrap_err();
+            assert!(error.contains(reason), "{text:?} gave {error}");
+            assert!(error.contains("pkg/msg/Root"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_full_definition_parses_to_the_same_as_its_parts() {
+        for name in ["visualization_msgs/MarkerArray", "sensor_msgs/JointState"] {
+            let full = full_definition(name).unwrap();
+            let from_parts = standard_definition(name).unwrap();
+            assert_eq!(
+                Definition::parse(name, &full).unwrap(),
+                Definition::parse(name, from_parts).unwrap()
+            );
+            assert!(full.contains(&format!("{}\nMSG: std_msgs/Header\n", "=".repeat(80))));
+        }
+    }
 }
