@@ -35,7 +35,7 @@ fn as_shipped() -> Robot {
         max_edge: f64::INFINITY,
         ..LoadOptions::default()
     };
-    iiwa14(&options).unwrap()
+    iiwa14(&options).expect("the shipped robot loads")
 }
 
 fn meshes(robot: &Robot) -> Vec<(&str, &TriangleMesh)> {
@@ -48,7 +48,8 @@ fn meshes(robot: &Robot) -> Vec<(&str, &TriangleMesh)> {
 fn origin(robot: &Robot, position: [f64; 7], link: &str) -> Point3<f64> {
     let mut kinematics = Kinematics::new(robot);
     kinematics.update(robot, &position);
-    kinematics.root_from_link(robot.link_index(link).unwrap()) * Point3::origin()
+    let link = robot.link_index(link).expect("the link is there");
+    kinematics.root_from_link(link) * Point3::origin()
 }
 
 #[test]

@@ -1,38 +1,37 @@
-//! From a solid to triangles: surface nets on a grid, then vertices spread evenly and moved onto the surface.
+//! From a solid to triangles: surface nets on a grid, then vertices moved until the faces lie on the surface.
 //!
-//! Surface nets: S. F. Frisken Gibson, "Constrained Elastic Surface Nets", MICCAI 1998.
+//! Surface nets: S. F. Frisken Gibson, "Constrained Elastic Surface Nets", MICCAI 1998. The moving, which spreads the
+//! vertices evenly and draws them onto sharp rims: Y. Ohtake and A. G. Belyaev, "Dual/Primal Mesh Optimization for
+//! Polygonized Implicit Surfaces", SMA 2002.
 
 use std::collections::HashMap;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use palpate_model::TriangleMesh;
 
 use crate::shape::Shape;
 
 /// Half the edge (m) of the cube about the origin that is searched.
 const REACH: f64 = 0.36;
-/// Rounds of spreading the vertices.
-const ROUNDS: usize = 12;
+/// Rounds of moving the vertices.
+const ROUNDS: usize = 15;
+/// Weight that holds a vertex to the middle of its faces, against 1 that holds it to their planes.
+const MIDDLE_WEIGHT: f64 = 0.1;
+/// How much longer than the other a quad's diagonal may be, a unit of its distance to the surface.
+const DISTANCE_WEIGHT: f64 = 20.0;
 
 type Cell = [i32; 3];
 
 /// Triangles of the surface of `shape`, from a grid of cubes of edge `step` (m); coordinates rounded to 1e-5 m.
 pub fn contour(shape: &Shape, step: f64) -> TriangleMesh {
     let mut net = Net::new(shape, step);
-    let neighbors = neighbors(net.vertices.len(), &net.quads);
     for _ in 0..ROUNDS {
-        spread(shape, &mut net.vertices, &neighbors);
+        net.relax(shape, step);
     }
-    let vertices: Vec<_> = net
-        .vertices
-        .iter()
-        .map(|v| Point3::from(v.map(rounded)))
-        .collect();
-    let triangles = net
-        .quads
-        .iter()
-        .flat_map(|quad| split(quad, &vertices))
-        .collect();
+    let rounded = |vertex: &Vector3<f64>| Point3::from(vertex.map(|x| (x * 1e5).round() / 1e5));
+    let vertices: Vec<_> = net.vertices.iter().map(rounded).collect();
+    let split = |quad| split(shape, &vertices, quad);
+    let triangles = net.quads.iter().flat_map(split).collect();
     TriangleMesh {
         vertices,
         triangles,
@@ -79,6 +78,67 @@ impl Net {
             u32::try_from(vertices.len() - 1).unwrap_or(u32::MAX)
         })
     }
+
+    /// Moves every vertex to where the planes of the faces around it meet, or as near as it is held to their middle.
+    fn relax(&mut self, shape: &Shape, step: f64) {
+        let mut fits = vec![Fit::default(); self.vertices.len()];
+        for quad in &self.quads {
+            let sum: Vector3<f64> = quad.iter().map(|&v| self.vertices[v as usize]).sum();
+            let middle = onto_surface(shape, 0.25 * sum);
+            let normal = shape.gradient(middle).normalize();
+            for &vertex in quad {
+                fits[vertex as usize].add(middle, normal);
+            }
+        }
+        for (vertex, fit) in self.vertices.iter_mut().zip(&fits) {
+            *vertex = fit.vertex(step);
+        }
+    }
+}
+
+/// Sums over the planes that a vertex should lie on, each through a point, with a normal.
+#[derive(Clone, Default)]
+struct Fit {
+    count: f64,
+    points: Vector3<f64>,
+    /// Σ n nᵀ
+    normals: Matrix3<f64>,
+    /// Σ n (nᵀ p)
+    offsets: Vector3<f64>,
+}
+
+impl Fit {
+    fn add(&mut self, point: Vector3<f64>, normal: Vector3<f64>) {
+        self.count += 1.0;
+        self.points += point;
+        self.normals += normal * normal.transpose();
+        self.offsets += normal * normal.dot(&point);
+    }
+
+    /// Least squares from the points' middle, no farther from it than `most`.
+    fn vertex(&self, most: f64) -> Vector3<f64> {
+        let middle = self.points / self.count;
+        let residual = self.offsets - self.normals * middle;
+        let matrix = self.normals + Matrix3::identity() * (MIDDLE_WEIGHT * self.count);
+        let shift = solve(&matrix, &residual);
+        middle + shift * (most / shift.norm().max(most))
+    }
+}
+
+/// Cramer's rule, for a matrix that is positive definite.
+fn solve(matrix: &Matrix3<f64>, right: &Vector3<f64>) -> Vector3<f64> {
+    let [a, b, c] = [0, 1, 2].map(|column| matrix.column(column).into_owned());
+    let determinant = a.dot(&b.cross(&c));
+    let along = [b.cross(&c), c.cross(&a), a.cross(&b)].map(|normal| right.dot(&normal));
+    Vector3::from(along) / determinant
+}
+
+fn onto_surface(shape: &Shape, mut point: Vector3<f64>) -> Vector3<f64> {
+    for _ in 0..3 {
+        let gradient = shape.gradient(point);
+        point -= gradient * (shape.value(point) / gradient.norm_squared().max(0.1));
+    }
+    point
 }
 
 /// Which grid points lie inside.
@@ -130,41 +190,26 @@ fn around(cell: Cell, axis: usize) -> [Cell; 4] {
     [neighbor(left, v, -1), below, cell, left]
 }
 
-fn neighbors(vertices: usize, quads: &[[u32; 4]]) -> Vec<Vec<u32>> {
-    let mut neighbors = vec![Vec::new(); vertices];
-    for quad in quads {
-        for side in 0..4 {
-            neighbors[quad[side] as usize].push(quad[(side + 1) % 4]);
-        }
-    }
-    neighbors
-}
-
-/// Moves every vertex to the middle of its neighbours, along the surface, and then onto the surface.
-fn spread(shape: &Shape, vertices: &mut [Vector3<f64>], neighbors: &[Vec<u32>]) {
-    let old = vertices.to_vec();
-    for (vertex, neighbors) in vertices.iter_mut().zip(neighbors) {
-        let sum: Vector3<f64> = neighbors.iter().map(|&other| old[other as usize]).sum();
-        *vertex = sum / neighbors.len() as f64;
-        for _ in 0..3 {
-            let gradient = shape.gradient(*vertex);
-            *vertex -= gradient * (shape.value(*vertex) / gradient.norm_squared().max(0.1));
-        }
-    }
-}
-
-/// Splits a quad along its shorter diagonal.
-fn split(quad: &[u32; 4], vertices: &[Point3<f64>]) -> [[u32; 3]; 2] {
+/// Splits a quad along the diagonal that is short, near the surface, and leaves no sliver.
+fn split(shape: &Shape, vertices: &[Point3<f64>], quad: &[u32; 4]) -> [[u32; 3]; 2] {
     let &[a, b, c, d] = quad;
-    let length =
-        |from: u32, to: u32| (vertices[from as usize] - vertices[to as usize]).norm_squared();
-    if length(a, c) <= length(b, d) {
-        [[a, b, c], [a, c, d]]
+    let at = |vertex: u32| vertices[vertex as usize].coords;
+    let cost = |triangles: &[[u32; 3]; 2]| {
+        let [from, _, to] = triangles[0].map(at);
+        let distance = shape.value(0.5 * (from + to)).abs();
+        let [first, second] = triangles.map(|triangle| fullness(triangle.map(at)));
+        ((to - from).norm() + DISTANCE_WEIGHT * distance) / first.min(second)
+    };
+    let splits = [[[a, b, c], [c, d, a]], [[b, c, d], [d, a, b]]];
+    if cost(&splits[0]) <= cost(&splits[1]) {
+        splits[0]
     } else {
-        [[a, b, d], [b, c, d]]
+        splits[1]
     }
 }
 
-fn rounded(coordinate: f64) -> f64 {
-    (coordinate * 1e5).round() / 1e5
+/// Height of a triangle over its longest side, a unit of that side.
+fn fullness([a, b, c]: [Vector3<f64>; 3]) -> f64 {
+    let sides = [b - a, c - b, a - c].map(|side| side.norm_squared());
+    (b - a).cross(&(c - a)).norm() / sides[0].max(sides[1]).max(sides[2])
 }

@@ -13,22 +13,22 @@ pub const HEIGHTS: [f64; 8] = [0.1575, 0.2025, 0.2045, 0.2155, 0.1845, 0.2155, 0
 pub const MASSES: [f64; 8] = [5.0, 5.7, 5.9, 3.6, 3.5, 3.1, 2.1, 1.0];
 /// Grid steps (m) that give each link its number of triangles.
 pub const CELLS: [f64; 8] = [
-    0.0111, 0.0115, 0.0111, 0.0103, 0.0101, 0.0088, 0.0084, 0.0056,
+    0.0111, 0.0110, 0.0106, 0.0100, 0.0098, 0.0086, 0.0080, 0.0054,
 ];
 
 /// Radii (m) of the housings that turn about z at the seams A1, A3, A5, A7.
 pub const SEAM_RADII: [f64; 4] = [0.086, 0.068, 0.068, 0.050];
 /// Half widths (m) of the parts' worn edges.
-const EDGE: f64 = 0.004;
+const EDGE: f64 = 0.002;
 
 /// The solid of a link in its own frame.
 pub fn link(index: usize) -> Shape {
     let standing = match index {
         0 => base(),
-        1 => elbow(0.086, 0.116, SEAM_RADII[0], HEIGHTS[1]).seen_from(hanging(-1.0, HEIGHTS[1])),
-        2 => elbow(0.086, 0.130, SEAM_RADII[1], HEIGHTS[2]),
-        3 => elbow(0.068, 0.114, SEAM_RADII[1], HEIGHTS[3]).seen_from(hanging(1.0, HEIGHTS[3])),
-        4 => elbow(0.068, 0.114, SEAM_RADII[2], HEIGHTS[4]).seen_from(|p| mirrored(p, -1.0)),
+        1 => elbow(0.081, 0.112, SEAM_RADII[0], HEIGHTS[1]).seen_from(hanging(-1.0, HEIGHTS[1])),
+        2 => elbow(0.081, 0.126, SEAM_RADII[1], HEIGHTS[2]),
+        3 => elbow(0.0645, 0.110, SEAM_RADII[1], HEIGHTS[3]).seen_from(hanging(1.0, HEIGHTS[3])),
+        4 => elbow(0.0645, 0.110, SEAM_RADII[2], HEIGHTS[4]).seen_from(|p| mirrored(p, -1.0)),
         5 => forearm(),
         6 => wrist(),
         _ => flange(),
@@ -73,13 +73,15 @@ fn elbow(radius: f64, depth: f64, seam_radius: f64, height: f64) -> Shape {
     );
     let bend = Shape::capsule(
         [0.0, depth - 0.95 * seam_radius, 0.0],
-        [0.0, 0.0, height],
-        [0.9 * seam_radius, 0.98 * seam_radius],
+        [0.0, 0.0, height - 0.03],
+        [0.9 * seam_radius; 2],
     );
-    let room = |gap: f64| Shape::drum([0.0, -0.3, 0.0], [0.0; 3], [radius + gap; 2], 0.001);
-    let neck = top.or(bend, 0.03).without(room(0.012), 0.06);
+    let room = |gap: f64, end: f64| {
+        Shape::drum([0.0, -0.3, 0.0], [0.0, end, 0.0], [radius + gap; 2], EDGE)
+    };
+    let neck = top.or(bend, 0.02).without(room(0.012, 0.0), 0.06);
     neck.or(drum.and(Shape::half_space(1, -1.0, 0.0), EDGE), 0.03)
-        .without(room(EDGE), EDGE)
+        .without(room(0.004, -0.004), 0.012)
         .and(Shape::half_space(2, 1.0, height), EDGE)
 }
 
@@ -104,20 +106,21 @@ fn forearm() -> Shape {
     let height = HEIGHTS[5];
     let housing = Shape::drum(
         [0.0, 0.0, -0.1],
-        [0.0, 0.0, 0.075],
+        [0.0, 0.0, 0.072],
         [SEAM_RADII[2]; 2],
         0.035,
     );
-    let shoulder = Shape::capsule([0.0, -0.012, 0.03], [0.0, -0.070, 0.125], [0.056, 0.026]);
-    let blade = Shape::block([-0.036, -0.098, 0.05], [0.036, -0.064, height], 0.014);
+    let shoulder = Shape::capsule([0.0, -0.010, 0.03], [0.0, -0.066, 0.125], [0.054, 0.024]);
+    let blade = Shape::block([-0.035, -0.096, 0.05], [0.035, -0.066, height], 0.014)
+        .seen_from(|p| Vector3::new(p.x, p.y - 0.25 * (0.17 - p.z).max(0.0), p.z));
     let disc = Shape::drum(
         [0.0, -0.098, height],
-        [0.0, -0.064, height],
-        [0.050; 2],
-        0.012,
+        [0.0, -0.063, height],
+        [0.049; 2],
+        0.010,
     );
     let room = Shape::drum([0.0, -0.063, height], [0.0, 0.3, height], [0.095; 2], 0.004);
-    (housing.or(shoulder, 0.03).or(blade, 0.04).or(disc, 0.03))
+    (housing.or(shoulder, 0.02).or(blade, 0.04).or(disc, 0.03))
         .without(room, 0.02)
         .and(Shape::half_space(2, -1.0, 0.0), EDGE)
 }
@@ -126,12 +129,12 @@ fn forearm() -> Shape {
 fn wrist() -> Shape {
     let height = HEIGHTS[6];
     let drum = Shape::drum(
-        [0.0, -0.15, -0.014],
-        [0.0, 0.067, -0.014],
-        [0.068; 2],
-        0.050,
+        [0.0, -0.15, -0.016],
+        [0.0, 0.062, -0.014],
+        [0.060; 2],
+        0.048,
     );
-    let neck = Shape::drum([0.0, 0.0, -0.03], [0.0, 0.0, 0.2], [0.064, 0.040], 0.01);
+    let neck = Shape::drum([0.0, 0.0, -0.03], [0.0, 0.0, 0.2], [0.062, 0.042], 0.01);
     drum.or(neck, 0.04)
         .and(Shape::half_space(1, -1.0, -0.062), EDGE)
         .and(Shape::half_space(2, 1.0, height), EDGE)
@@ -139,7 +142,7 @@ fn wrist() -> Shape {
 
 /// The flange that carries the tool.
 fn flange() -> Shape {
-    let ring = Shape::drum([0.0; 3], [0.0, 0.0, 0.026], [SEAM_RADII[3]; 2], 0.004);
-    let face = Shape::drum([0.0; 3], [0.0, 0.0, HEIGHTS[7]], [0.045; 2], 0.003);
-    ring.or(face, 0.004)
+    let ring = Shape::drum([0.0; 3], [0.0, 0.0, 0.028], [SEAM_RADII[3]; 2], EDGE);
+    let face = Shape::drum([0.0; 3], [0.0, 0.0, HEIGHTS[7]], [0.042; 2], EDGE);
+    ring.or(face, EDGE)
 }

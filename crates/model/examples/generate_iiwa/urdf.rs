@@ -102,14 +102,14 @@ fn link(index: usize, inertia: &Inertia) -> String {
 
 /// An orange ring, to look at only, on the seams where a link turns about its own length.
 fn ring(index: usize) -> String {
-    let Some(radius) = (index % 2 == 1).then(|| SEAM_RADII[index / 2] + 0.0008) else {
+    let Some(radius) = (index % 2 == 1).then(|| SEAM_RADII[index / 2] + 0.0015) else {
         return String::new();
     };
     format!(
         r#"    <visual>
       <origin xyz="0 0 0" rpy="0 0 0"/>
       <geometry>
-        <cylinder radius="{radius}" length="0.008"/>
+        <cylinder radius="{radius}" length="0.006"/>
       </geometry>
       <material name="orange"/>
     </visual>
