@@ -44,6 +44,8 @@ _palpate_use_wheels() {
     export _ROS_WHEELS_BOOTSTRAP_COMPLETE=1
     export LD_LIBRARY_PATH=$venv/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
     export PATH=$venv/bin:$PATH
+    PYTHONPATH=$(echo "$venv"/lib/python3*/site-packages)${PYTHONPATH:+:$PYTHONPATH}
+    export PYTHONPATH
     # For r2r's binding generator.
     LIBCLANG_PATH=$(echo "$venv"/lib/python3*/site-packages/clang/native)
     BINDGEN_EXTRA_CLANG_ARGS="-I$("${CC:-cc}" -print-file-name=include)"

@@ -418,6 +418,16 @@ mod tests {
     }
 
     #[test]
+    fn the_shipped_file_says_the_defaults() {
+        let mut shipped =
+            Settings::from_ros_yaml(include_str!("../../../config/palpate.yaml")).unwrap();
+        // ROS 2 has no empty list without a type.
+        assert_eq!(shipped.robot.package_folders(), [] as [PathBuf; 0]);
+        shipped.robot.package_dirs.clear();
+        assert_eq!(shipped, Settings::default());
+    }
+
+    #[test]
     fn what_every_ros_node_is_given_is_skipped() {
         let given = [("qos_overrides./clock.depth".to_owned(), Value::from(1))];
         assert_eq!(Settings::from_flat(given).unwrap(), Settings::default());

@@ -50,14 +50,14 @@ pub fn pose(pose: &ContactPose, header: Header) -> PoseWithCovarianceStamped {
     }
 }
 
-/// The force on the robot, and its moment about the origin of the root frame.
+/// The force on the robot. It acts at the contact point, about which its torque is zero.
 pub fn wrench(mode: &Mode, header: Header) -> WrenchStamped {
     let force = mode.force_in_root;
     WrenchStamped {
         header,
         wrench: Wrench {
-            force: vector(&force),
-            torque: vector(&mode.point_in_root.coords.cross(&force)),
+            force: scale(force.x, force.y, force.z),
+            torque: Vector3::default(),
         },
     }
 }
@@ -157,14 +157,6 @@ fn point(point: &Point3<f64>) -> Point {
         x: point.x,
         y: point.y,
         z: point.z,
-    }
-}
-
-fn vector(vector: &nalgebra::Vector3<f64>) -> Vector3 {
-    Vector3 {
-        x: vector.x,
-        y: vector.y,
-        z: vector.z,
     }
 }
 

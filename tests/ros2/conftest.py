@@ -1,0 +1,41 @@
+"""Fixtures: a domain a test, a peer, and the node as a process that must end well."""
+
+import pytest
+from support import URDF, PalpateNode, Peer, new_domain
+
+
+@pytest.fixture
+def domain():
+    return new_domain()
+
+
+@pytest.fixture
+def peer(domain):
+    peer = Peer(domain)
+    yield peer
+    peer.close()
+
+
+@pytest.fixture
+def start(domain, tmp_path):
+    """Starts nodes; those that still run at the end must end with exit code 0."""
+    nodes = []
+
+    def start_node(*arguments, **parameters):
+        log = tmp_path / f"node_{len(nodes)}.log"
+        node = PalpateNode(domain, log, *arguments, parameters=parameters)
+        nodes.append(node)
+        return node
+
+    yield start_node
+    running = [node for node in nodes if node.process.poll() is None]
+    codes = [node.end() for node in running]
+    for node in nodes:
+        print(node.log())
+    assert codes == [0] * len(running)
+
+
+@pytest.fixture
+def node(start):
+    """A node with the arm that ships with the project, and few particles."""
+    return start(**{"robot.description_file": URDF, "filter.particles": 1000})

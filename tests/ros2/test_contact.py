@@ -1,0 +1,97 @@
+"""A simulated touch, played on real topics, is seen by a listener."""
+
+import math
+import os
+import struct
+import subprocess
+from pathlib import Path
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseWithCovarianceStamped, WrenchStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Bool
+from support import URDF, play
+from visualization_msgs.msg import Marker, MarkerArray
+
+PARTICLES = 2000
+LINK, LINK_INDEX = "lbr_link_4", 4
+LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@pytest.fixture(scope="session")
+def bag(tmp_path_factory):
+    """The project's own simulator makes the bag."""
+    out = tmp_path_factory.mktemp("bag") / "contact"
+    scenario = Path(__file__).with_name("contact.yaml")
+    subprocess.run([os.environ["PALPATE"], "simulate", scenario, "--out", out], check=True)
+    return out
+
+
+@pytest.mark.parametrize("options", [[], ["--best-effort"]], ids=["reliable", "best_effort"])
+def test_a_touch_is_located_drawn_and_counted(peer, domain, start, bag, options):
+    start(**{"robot.description_file": URDF, "filter.particles": PARTICLES})
+    poses = peer.listen(PoseWithCovarianceStamped, "palpate/contact_pose")
+    wrenches = peer.listen(WrenchStamped, "palpate/contact_wrench")
+    detected = peer.listen(Bool, "palpate/contact_detected", LATCHED)
+    clouds = peer.listen(PointCloud2, "palpate/particles")
+    pictures = peer.listen(MarkerArray, "palpate/markers")
+    diagnostics = peer.listen(DiagnosticArray, "/diagnostics")
+    player = play(bag, domain, *options)
+    peer.wait_until(lambda: player.poll() is not None, "the player to end", limit_secs=60.0)
+    assert player.returncode == 0
+    counts = peer.counts(diagnostics)
+
+    assert [message.data for message in detected][:2] == [False, True]
+    assert len(poses) == len(wrenches) > 300
+    assert all(is_finite_pose(message) for message in poses)
+    assert all(math.isfinite(value) for message in wrenches for value in force(message))
+    assert math.hypot(*force(wrenches[-1])) > 1.0
+    check_cloud(clouds[-1])
+    check_markers(pictures[-1])
+
+    used, lost = int(counts["samples used"]), int(counts["samples lost, filter too slow"])
+    assert used + lost > 550 and counts["refused, not finite"] == "0", counts
+    frames = {message.header.frame_id for message in [*poses, *wrenches, *clouds]}
+    assert frames == {"lbr_link_0"}
+
+
+def is_finite_pose(message):
+    pose = message.pose.pose
+    position, turn = pose.position, pose.orientation
+    values = [position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w, *message.pose.covariance]
+    unit = math.hypot(turn.x, turn.y, turn.z, turn.w)
+    return all(math.isfinite(value) for value in values) and abs(unit - 1.0) < 1e-6
+
+
+def force(message):
+    vector = message.wrench.force
+    return vector.x, vector.y, vector.z
+
+
+def check_cloud(cloud):
+    assert [field.name for field in cloud.fields] == [
+        "x", "y", "z", "normal_x", "normal_y", "normal_z", "weight", "force", "stiffness", "link",
+    ]  # fmt: skip
+    assert cloud.width == PARTICLES and cloud.height == 1
+    assert len(cloud.data) == cloud.width * cloud.point_step
+    points = list(struct.iter_unpack("<9fI", bytes(cloud.data)))
+    assert all(math.isfinite(value) for point in points for value in point)
+    assert abs(sum(point[6] for point in points) - 1.0) < 1e-3
+    on_link = sum(point[6] for point in points if point[9] == LINK_INDEX)
+    assert on_link > 0.5, f"weight on {LINK}: {on_link}"
+
+
+def check_markers(picture):
+    first, *markers = picture.markers
+    assert first.action == Marker.DELETEALL
+    spheres = [marker for marker in markers if marker.type == Marker.SPHERE_LIST]
+    arrows = [marker for marker in markers if marker.type == Marker.ARROW]
+    labels = [marker for marker in markers if marker.type == Marker.TEXT_VIEW_FACING]
+    assert len(spheres) == 1 and len(arrows) >= 1 and len(labels) == 1
+    assert len(spheres[0].points) == len(spheres[0].colors) == PARTICLES
+    assert len({(color.r, color.g) for color in spheres[0].colors}) > 1
+    assert all(len(arrow.points) == 2 for arrow in arrows)
+    assert labels[0].text.startswith(LINK), labels[0].text
+    assert {marker.header.frame_id for marker in markers} == {"lbr_link_0"}
