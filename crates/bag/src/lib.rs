@@ -13,6 +13,8 @@ mod samples;
 mod source;
 mod sqlite_file;
 mod standard;
+#[cfg(test)]
+mod tests;
 mod value;
 mod writer;
 

@@ -38,6 +38,11 @@ impl BagWriter {
     /// # Errors
     /// If a file or folder cannot be made.
     pub fn create(path: &Path) -> Result<Self, BagError> {
+        Self::with_options(path, WriteOptions::new())
+    }
+
+    /// Starts a bag with another way of compressing.
+    pub(crate) fn with_options(path: &Path, options: WriteOptions) -> Result<Self, BagError> {
         let lone = path
             .extension()
             .is_some_and(|extension| extension == "mcap");
@@ -48,7 +53,7 @@ impl BagWriter {
             let name = path.file_name().unwrap_or("bag".as_ref());
             path.join(format!("{}_0.mcap", name.to_string_lossy()))
         };
-        let options = WriteOptions::new()
+        let options = options
             .profile("ros2")
             .library(concat!("palpate ", env!("CARGO_PKG_VERSION")))
             .compression_threads(0);
