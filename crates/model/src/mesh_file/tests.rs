@@ -253,7 +253,10 @@ fn damage(whole: &[u8], random: &mut StdRng) -> Vec<u8> {
     const TELLING: &[u8] = b"\0\n -+./<>#\"0123456789eE\xff";
     let mut bytes = whole.to_vec();
     for _ in 0..random.random_range(1..4) {
-        let place = random.random_range(0..bytes.len().max(2) - 1);
+        if bytes.len() < 2 {
+            break;
+        }
+        let place = random.random_range(0..bytes.len());
         let end = (place + random.random_range(1..40)).min(bytes.len());
         match random.random_range(0..6) {
             0 => bytes[place] = random.random(),
