@@ -2,17 +2,20 @@
 
 mod bag;
 mod cdr;
+mod choice;
 mod definition;
 mod encode;
 mod error;
 mod mcap_file;
 mod message;
 mod metadata;
+mod reading;
 mod record;
 mod samples;
 mod source;
 mod sqlite_file;
 mod standard;
+mod storage;
 #[cfg(test)]
 mod tests;
 mod value;
@@ -20,9 +23,10 @@ mod writer;
 
 pub use bag::{Bag, Message, Topic};
 pub use cdr::{CdrError, decode};
+pub use choice::TopicChoice;
 pub use definition::Definition;
 pub use error::BagError;
 pub use record::topics;
-pub use samples::{Recording, TopicChoice, TopicReport, Unusable, read_samples};
+pub use samples::{Recording, TopicReport, Unusable, read_samples};
 pub use value::Value;
 pub use writer::BagWriter;
