@@ -1,15 +1,19 @@
 //! The `palpate` command: where something touches a robot arm, from joint positions and joint torques.
 
 mod estimates_csv;
+mod inspect;
 mod last_second;
 mod progress;
+mod recorder;
 mod replay;
 mod robot_args;
+mod simulate;
 mod table;
 mod track;
 
 use std::error::Error;
 use std::io::{self, IsTerminal};
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -34,6 +38,8 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Replay(replay::Replay),
+    Simulate(simulate::Simulate),
+    Inspect(inspect::Inspect),
 }
 
 /// Options that contradict the data or each other, found after parsing.
@@ -41,11 +47,21 @@ enum Command {
 #[error("{0}")]
 struct Usage(String);
 
+/// An input file that cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot read {path}: {source}")]
+struct Unreadable {
+    path: String,
+    source: io::Error,
+}
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
     listen(cli.verbose);
     let done = match &cli.command {
         Command::Replay(replay) => replay.run(),
+        Command::Simulate(simulate) => simulate.run(),
+        Command::Inspect(inspect) => inspect.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -56,6 +72,14 @@ fn main() -> ExitCode {
             ExitCode::from(code(&error))
         }
     }
+}
+
+/// Reads a text file of the user's.
+fn read_text(path: &Path) -> Result<String, Unreadable> {
+    std::fs::read_to_string(path).map_err(|source| Unreadable {
+        path: path.display().to_string(),
+        source,
+    })
 }
 
 fn listen(verbose: u8) {
@@ -84,6 +108,7 @@ fn code(error: &anyhow::Error) -> u8 {
                 || cause.is::<SettingsError>()
                 || cause.is::<ParameterError>()
                 || cause.is::<SimError>()
+                || cause.is::<Unreadable>()
         }
     };
     if error.chain().any(|cause| cause.is::<Usage>()) {

@@ -7,12 +7,13 @@ use anyhow::{Context, Result};
 use clap::Args;
 use palpate_bag::{Bag, Recording, TopicChoice, TopicReport, read_samples};
 use palpate_filter::{ContactStatus, Filter, Settings};
-use palpate_model::Robot;
+use palpate_model::{JointSample, Robot};
 
 use crate::last_second::LastSecond;
+use crate::recorder::Recorder;
 use crate::robot_args::RobotArgs;
 use crate::track::{Track, track};
-use crate::{estimates_csv, progress, table};
+use crate::{estimates_csv, progress, read_text, table};
 
 /// Estimate the contacts of a recorded bag
 ///
@@ -67,16 +68,17 @@ impl Replay {
         let mut filter = Filter::new(&robot, &settings.filter, settings.seed)?;
         let bar = progress::bar(recording.samples.len(), "replay", self.quiet);
         let jump_secs = settings.input.time_jump_secs;
-        let track = track(
-            &mut filter,
-            robot.dof(),
-            &recording.samples,
-            jump_secs,
-            |_, _| {
-                bar.inc(1);
-                Ok(())
-            },
-        )?;
+        let mut recorder = self.recorder(&settings, &recording)?;
+        let see = |sample: &JointSample, filter: &Filter| {
+            bar.inc(1);
+            if let Some(recorder) = &mut recorder {
+                recorder.sample(&robot, filter.kinematics(), sample)?;
+                recorder.estimate(&robot, filter)?;
+            }
+            Ok(())
+        };
+        let track = track(&mut filter, robot.dof(), &recording.samples, jump_secs, see)?;
+        recorder.map(Recorder::finish).transpose()?;
         bar.finish_and_clear();
         if let Some(path) = &self.estimates {
             estimates_csv::write(path, &robot, &track.estimates)?;
@@ -88,9 +90,20 @@ impl Replay {
         Ok(())
     }
 
+    /// The bag to write, if one is asked for.
+    fn recorder(&self, settings: &Settings, recording: &Recording) -> Result<Option<Recorder>> {
+        let (Some(path), Some(first)) = (&self.out, recording.samples.first()) else {
+            return Ok(None);
+        };
+        let urdf = read_text(&self.robot.urdf(&settings.robot)?)?;
+        let rate = settings.viz.rate;
+        let recorder = Recorder::create(path, &urdf, first.stamp_ns, rate)?;
+        Ok(Some(recorder))
+    }
+
     fn read(&self, robot: &Robot, settings: &Settings) -> Result<Recording> {
         let whose = || format!("bag {}", self.bag.display());
-        let bag = Bag::open(&self.bag).with_context(whose)?;
+        let bag = Bag::open(&self.bag)?;
         let choice = TopicChoice {
             positions: self.positions.clone(),
             torques: self.torques.clone(),
