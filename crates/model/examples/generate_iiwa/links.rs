@@ -18,7 +18,7 @@ pub const CELLS: [f64; 8] = [
 
 /// Radii (m) of the housings that turn about z at the seams A1, A3, A5, A7.
 pub const SEAM_RADII: [f64; 4] = [0.086, 0.068, 0.068, 0.050];
-/// Half widths (m) of the parts' worn edges.
+/// Width (m) over which the rims of the parts are worn.
 const EDGE: f64 = 0.002;
 
 /// The solid of a link in its own frame.
@@ -82,10 +82,11 @@ fn elbow(radius: f64, depth: f64, seam_radius: f64, height: f64) -> Shape {
     let neck = top.or(bend, 0.02).without(room(0.012, 0.0), 0.06);
     neck.or(drum.and(Shape::half_space(1, -1.0, 0.0), EDGE), 0.03)
         .without(room(0.004, -0.004), 0.012)
+        .without(room(0.0, 0.0), EDGE)
         .and(Shape::half_space(2, 1.0, height), EDGE)
 }
 
-/// Foot with four feet, a cone, and the box for the cables at the back.
+/// A cone on four feet, and the box for the cables at the back.
 fn base() -> Shape {
     let height = HEIGHTS[0];
     let cone = Shape::drum([0.0; 3], [0.0, 0.0, height], [0.102, SEAM_RADII[0]], EDGE);
@@ -129,7 +130,7 @@ fn forearm() -> Shape {
 fn wrist() -> Shape {
     let height = HEIGHTS[6];
     let drum = Shape::drum(
-        [0.0, -0.15, -0.016],
+        [0.0, -0.15, -0.014],
         [0.0, 0.062, -0.014],
         [0.060; 2],
         0.048,
@@ -145,4 +146,5 @@ fn flange() -> Shape {
     let ring = Shape::drum([0.0; 3], [0.0, 0.0, 0.028], [SEAM_RADII[3]; 2], EDGE);
     let face = Shape::drum([0.0; 3], [0.0, 0.0, HEIGHTS[7]], [0.042; 2], EDGE);
     ring.or(face, EDGE)
+        .and(Shape::half_space(2, -1.0, 0.0), EDGE)
 }
