@@ -16,6 +16,9 @@ use crate::{Obstacle, Scenario};
 const RETREAT: f64 = 0.025;
 /// Farthest that the contact may go along the link in one sample, m: beyond it, it is another contact.
 const LONGEST_JUMP: f64 = 0.005;
+/// Largest turn of its direction in one sample, rad: in a groove, where two contacts are equally deep, the deepest point
+/// goes back and forth between them.
+const LARGEST_TURN: f64 = 0.1;
 /// Farthest that it may go in all, m, with an obstacle at rest.
 const LONGEST_TRAVEL: f64 = 0.04;
 /// Least share of the wanted travel, where the link has joints enough for it.
@@ -226,7 +229,10 @@ fn follow(
         )?;
         let contact = scene.in_link(&kinematics, &touch.point_in_root);
         let jump = contacts.last().map_or(0.0, |last| (contact - last).norm());
-        if jump > LONGEST_JUMP {
+        let turn = (steps.last()).map_or(0.0, |last: &Step| {
+            last.touch.push_in_root.angle(&touch.push_in_root)
+        });
+        if jump > LONGEST_JUMP || turn > LARGEST_TURN {
             return Err(Refusal::Jumps);
         }
         if !is_within_limits(scene, &position) {
