@@ -4,10 +4,48 @@ use palpate_model::{Kinematics, Robot};
 
 use crate::detector::Detector;
 use crate::modes::ModeFinder;
+use crate::palpate::PalpateFilter;
 use crate::paper::PaperFilter;
 use crate::skin::Skin;
 use crate::step::Step;
-use crate::{Admitted, ContactEstimate, ContactStatus, ParameterError, Parameters, Particle};
+use crate::{Admitted, ContactEstimate, ContactStatus, Method, ParameterError, Parameters, Particle};
+
+/// The method chosen, with all that it knows of the present contact.
+enum Estimator {
+    Paper(PaperFilter),
+    Palpate(PalpateFilter),
+}
+
+impl Estimator {
+    fn new(robot: &Robot, parameters: &Parameters, seed: u64) -> Self {
+        let count = parameters.particles;
+        match parameters.method {
+            Method::Paper => Self::Paper(PaperFilter::new(parameters.paper.clone(), count, robot.links.len(), seed)),
+            Method::Palpate => Self::Palpate(PalpateFilter::new(robot, count, seed)),
+        }
+    }
+
+    fn begin(&mut self, skin: &Skin, number: u64, stamp_ns: i64, count: usize) {
+        match self {
+            Self::Paper(filter) => filter.begin(skin, number, count),
+            Self::Palpate(filter) => filter.begin(stamp_ns),
+        }
+    }
+
+    fn step(&mut self, step: &Step, stamp_ns: i64) {
+        match self {
+            Self::Paper(filter) => filter.step(step),
+            Self::Palpate(filter) => filter.step(step, stamp_ns),
+        }
+    }
+
+    fn show(&mut self, step: &Step, cloud: &mut Vec<Particle>) {
+        match self {
+            Self::Paper(filter) => filter.show(step.skin, cloud),
+            Self::Palpate(filter) => filter.show(step, cloud),
+        }
+    }
+}
 
 /// A particle filter for contacts on one robot. Deterministic for a seed, at any number of threads.
 pub struct Filter {
@@ -15,7 +53,7 @@ pub struct Filter {
     skin: Skin,
     parameters: Parameters,
     detector: Detector,
-    method: PaperFilter,
+    estimator: Estimator,
     modes: ModeFinder,
     before: Kinematics,
     now: Kinematics,
@@ -39,7 +77,7 @@ impl Filter {
         let count = parameters.particles;
         Ok(Self {
             detector: Detector::new(parameters.detector.clone(), robot.dof()),
-            method: PaperFilter::new(parameters.paper.clone(), count, robot.links.len(), seed),
+            estimator: Estimator::new(robot, parameters, seed),
             modes: ModeFinder::new(robot, &skin),
             before: Kinematics::new(robot),
             now: Kinematics::new(robot),
@@ -71,10 +109,11 @@ impl Filter {
             if !was_in_contact {
                 self.before.clone_from(&self.now);
                 self.position_before.copy_from_slice(&sample.position);
-                self.method
-                    .begin(&self.skin, self.number, self.parameters.particles);
+                let count = self.parameters.particles;
+                self.estimator
+                    .begin(&self.skin, self.number, sample.stamp_ns, count);
             }
-            self.method.step(&Step {
+            let step = Step {
                 robot: &self.robot,
                 skin: &self.skin,
                 before: &self.before,
@@ -83,8 +122,9 @@ impl Filter {
                 position: &sample.position,
                 torque: &sample.external_torque,
                 number: self.number,
-            });
-            self.method.show(&self.skin, &mut self.cloud);
+            };
+            self.estimator.step(&step, sample.stamp_ns);
+            self.estimator.show(&step, &mut self.cloud);
         }
         self.summarise(sample.stamp_ns, in_contact);
         self.position_before.copy_from_slice(&sample.position);

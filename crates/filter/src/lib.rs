@@ -5,6 +5,7 @@ mod estimate;
 mod filter;
 mod intake;
 mod modes;
+mod palpate;
 mod paper;
 mod parameters;
 mod particle;
@@ -20,7 +21,7 @@ pub use estimate::{ContactEstimate, ContactStatus, Mode};
 pub use filter::Filter;
 pub use intake::{Admitted, Intake, IntakeCounts, Refusal};
 pub use paper::{MotionModel, PaperParameters};
-pub use parameters::{ParameterError, Parameters};
+pub use parameters::{Method, ParameterError, Parameters};
 pub use particle::Particle;
 pub use scene::{
     Arrow, CLOUD_FIELDS, CLOUD_POINT_STEP, CloudField, CloudFieldType, CloudPoint, Colour,

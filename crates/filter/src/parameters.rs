@@ -5,10 +5,23 @@ use serde::{Deserialize, Serialize};
 use crate::detector::DetectorParameters;
 use crate::paper::PaperParameters;
 
+/// How contacts are estimated.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// The paper's filter, as published.
+    Paper,
+    /// The paper's curvature model with memory: obstacles at rest in the world, weighed by the whole contact.
+    #[default]
+    Palpate,
+}
+
 /// Parameters of the filter. Each field has its unit and default; unknown keys are refused.
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
+    /// The method: `paper` or `palpate`. Default `palpate`.
+    pub method: Method,
     /// Number of particles. Default 10,000.
     pub particles: usize,
     /// A contact counts as located when its first mode has at least this probability. Default 0.6.
@@ -24,6 +37,7 @@ pub struct Parameters {
 impl Default for Parameters {
     fn default() -> Self {
         Self {
+            method: Method::Palpate,
             particles: 10_000,
             located_probability: 0.6,
             located_std: 0.03,

@@ -90,6 +90,17 @@ impl Surface {
         self.triangles[triangle as usize].normal
     }
 
+    /// Centre of a triangle, m.
+    pub fn centroid(&self, triangle: u32) -> Point3<f64> {
+        self.triangles[triangle as usize].centroid().into()
+    }
+
+    /// The triangles that share an edge with this one.
+    pub fn neighbours(&self, triangle: u32) -> impl Iterator<Item = u32> {
+        let across = self.triangles[triangle as usize].across;
+        across.into_iter().filter(|&neighbour| neighbour != NONE)
+    }
+
     /// The point of the surface for three uniform numbers in \[0, 1): uniform over the area.
     pub fn sample(&self, uniform: [f64; 3]) -> SurfacePoint {
         let wanted = uniform[0] * self.area();

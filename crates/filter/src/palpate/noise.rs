@@ -1,0 +1,134 @@
+//! What is known of the torques' noise: white noise by joint, a slow part, and a constant bias of unknown scale.
+
+use super::memory::Keyframe;
+
+/// Standard deviations that a bias may have, Nm: which one fits, the data tell.
+const BIAS_SCALES: [f64; 3] = [0.004, 0.05, 0.25];
+/// Noise that does not average out within a keyframe: absolute, Nm, and as a share of the joint's rms torque.
+const FLOOR: f64 = 0.01;
+const FLOOR_SHARE: f64 = 0.01;
+/// Time over which that part is one and the same, s.
+const FLOOR_SECS: f64 = 0.2;
+
+/// The effect of a bias of one scale on one joint's sums.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Bias {
+    /// 1 / (Σ weight + 1 / variance).
+    pub(super) gain: f64,
+    /// gain × Σ weight × torque.
+    pub(super) mean: f64,
+}
+
+/// The noise model and the sums over the history that do not depend on a hypothesis.
+pub(super) struct Noise {
+    /// Variance of a sample's white noise, Nm².
+    white: Vec<f64>,
+    /// Mean square of the torque, Nm².
+    power: Vec<f64>,
+    /// How much larger the residuals are than expected, as a factor on the variance.
+    inflation: Vec<f64>,
+    /// Running sums for `white` and `power`.
+    last: [Vec<f64>; 2],
+    seen: f64,
+    second_difference: Vec<f64>,
+    square: Vec<f64>,
+    bias: [Vec<Bias>; BIAS_SCALES.len()],
+    base: [f64; BIAS_SCALES.len()],
+}
+
+impl Noise {
+    pub(super) fn new(dof: usize) -> Self {
+        Self {
+            white: vec![0.01; dof],
+            power: vec![0.0; dof],
+            inflation: vec![1.0; dof],
+            last: [vec![0.0; dof], vec![0.0; dof]],
+            seen: 0.0,
+            second_difference: vec![0.0; dof],
+            square: vec![0.0; dof],
+            bias: std::array::from_fn(|_| vec![Bias::default(); dof]),
+            base: [0.0; BIAS_SCALES.len()],
+        }
+    }
+
+    pub(super) fn begin(&mut self) {
+        self.seen = 0.0;
+        self.second_difference.fill(0.0);
+        self.square.fill(0.0);
+        self.inflation.fill(1.0);
+    }
+
+    /// Learns from one sample's torques: white noise shows in their second differences.
+    pub(super) fn learn(&mut self, torque: &[f64]) {
+        self.seen += 1.0;
+        for (joint, &torque) in torque.iter().enumerate() {
+            let [last, before] = [self.last[0][joint], self.last[1][joint]];
+            if self.seen > 2.0 {
+                self.second_difference[joint] += (torque - 2.0 * last + before).powi(2) / 6.0;
+            }
+            self.square[joint] += torque * torque;
+            self.last[1][joint] = last;
+            self.last[0][joint] = torque;
+            self.power[joint] = self.square[joint] / self.seen;
+            // A prior worth 10 samples: 0.1 Nm and a tenth of the torque.
+            let prior = 0.01_f64.max(0.01 * self.power[joint]);
+            let differences = (self.seen - 2.0).max(0.0);
+            self.white[joint] =
+                (self.second_difference[joint] + 10.0 * prior) / (differences + 10.0);
+            if differences > 60.0 {
+                self.white[joint] = self.second_difference[joint] / differences;
+            }
+        }
+    }
+
+    /// Inverse variance of a keyframe's mean torque on one joint.
+    pub(super) fn weight(&self, keyframe: &Keyframe, joint: usize) -> f64 {
+        let floor = FLOOR * FLOOR + FLOOR_SHARE * FLOOR_SHARE * self.power[joint];
+        let slow = floor * (FLOOR_SECS / keyframe.length_secs).min(1.0);
+        1.0 / (self.inflation[joint] * (self.white[joint] / keyframe.samples + slow))
+    }
+
+    /// Sets how much larger than expected the residuals are: mean square of the normalised residuals by joint.
+    pub(super) fn inflate(&mut self, joint: usize, factor: f64) {
+        self.inflation[joint] = factor.clamp(1.0, 1e4);
+    }
+
+    pub(super) fn inflation(&self, joint: usize) -> f64 {
+        self.inflation[joint]
+    }
+
+    /// Sums over the history what all hypotheses share.
+    pub(super) fn sum(&mut self, keyframes: &[Keyframe]) {
+        self.base = [0.0; BIAS_SCALES.len()];
+        for joint in 0..self.white.len() {
+            let (mut weight, mut first, mut second, mut log) = (0.0, 0.0, 0.0, 0.0);
+            for keyframe in keyframes {
+                let w = self.weight(keyframe, joint);
+                weight += w;
+                first += w * keyframe.torque[joint];
+                second += w * keyframe.torque[joint].powi(2);
+                log += w.ln();
+            }
+            for (scale, sigma) in BIAS_SCALES.into_iter().enumerate() {
+                let variance = sigma * sigma;
+                let gain = 1.0 / (weight + 1.0 / variance);
+                self.bias[scale][joint] = Bias { gain, mean: gain * first };
+                self.base[scale] +=
+                    0.5 * (log - second + gain * first * first - (1.0 + variance * weight).ln());
+            }
+        }
+    }
+
+    pub(super) fn bias_scales(&self) -> usize {
+        BIAS_SCALES.len()
+    }
+
+    pub(super) fn bias(&self, scale: usize, joint: usize) -> Bias {
+        self.bias[scale][joint]
+    }
+
+    /// Log evidence of the torques if nothing touched, for one scale of the biases.
+    pub(super) fn base(&self, scale: usize) -> f64 {
+        self.base[scale]
+    }
+}
