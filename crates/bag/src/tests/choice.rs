@@ -198,3 +198,27 @@ fn nothing_paired_is_an_error_with_its_reasons() {
         "{error}"
     );
 }
+
+#[test]
+fn efforts_of_a_second_joint_state_are_not_taken_silently() {
+    let (_folder, path) = place("bag.mcap");
+    let state = (&[1.0, 2.0][..], &[30.0, 40.0][..]);
+    write_states(
+        &path,
+        &[
+            ("/joint_states", state.0, state.1),
+            ("/arm/joint_states", state.0, state.1),
+        ],
+    );
+    let error = read_chosen(&path, Some("/joint_states"), None).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            BagError::Choice {
+                option: "--torques",
+                ..
+            }
+        ),
+        "{error}"
+    );
+}

@@ -28,7 +28,7 @@ fn a_cut_mcap_gives_what_is_left_and_says_so() {
     let (_folder, path) = place("bag.mcap");
     let whole = many_chunks(&path);
     let mut most = 0;
-    for length in 0..whole.len() {
+    for length in (0..whole.len()).step_by(7) {
         std::fs::write(&path, &whole[..length]).unwrap();
         match Bag::open(&path) {
             Ok(bag) => {
