@@ -87,6 +87,7 @@ impl PalpateFilter {
     pub(crate) fn step(&mut self, step: &Step, stamp_ns: i64) {
         self.noise.learn(step.torque);
         if self.memory.push(step.robot, stamp_ns, step.position, step.torque) {
+            self.calibrate(step);
             self.noise.sum(&self.memory.keyframes);
             self.keyframes_seen += 1;
             if self.populations[0].is_empty() {
@@ -95,7 +96,7 @@ impl PalpateFilter {
                 self.reweigh(step);
             }
             self.seek_peaks(step);
-            self.calibrate(step);
+            self.debug(step);
             for round in 0..ROUNDS {
                 self.mutate(step, round);
                 self.exchange(step, round);
@@ -147,6 +148,22 @@ impl PalpateFilter {
             }
         }
         self.peaks = kept;
+    }
+
+    fn debug(&self, step: &Step) {
+        if std::env::var("PDEBUG").is_err() || !(self.keyframes_seen.is_multiple_of(10)) { return; }
+        let Some((o, e)) = self.best() else { return };
+        println!("  kf {} best link {} log {:.1} F {:.1} K {:.0} mu {} bias {} r {:.4} centre {:.3?} infl {:.2?} white {:.4?}", self.keyframes_seen, o.link, e.log, e.force, e.stiffness, e.friction, e.bias_scale, e.reference, o.centre.coords.as_slice(), (0..step.torque.len()).map(|j| self.noise.inflation(j)).collect::<Vec<_>>(), self.noise.whites());
+        for p in self.peaks.iter().take(5) { println!("     peak link {} log {:.1} mass {:.1} r {:.4} F {:.1} K {:.0} mu {} bias {}", p.obstacle.link, p.evidence.log, p.log_mass, p.touch.distance, p.evidence.force, p.evidence.stiffness, p.evidence.friction, p.evidence.bias_scale); }
+        if let Ok(t) = std::env::var("TRUTH") {
+            let v: Vec<f64> = t.split(',').map(|x| x.parse().unwrap()).collect();
+            let link = v[0] as usize; let centre = nalgebra::Point3::new(v[1], v[2], v[3]);
+            let kf = &self.memory.keyframes[self.memory.keyframes.len()-1];
+            let tr = touch(step.skin.surface(link), &(kf.links[link].link_from_root * centre), None);
+            let mut o = Obstacle { link: link as u16, triangle: tr.triangle, centre };
+            let e = o.evidence(step.robot, step.skin, &self.memory.keyframes, &self.noise);
+            println!("     TRUE  link {} log {:.1} r {:.4} F {:.1} K {:.0} mu {} bias {}", link, e.log, tr.distance, e.force, e.stiffness, e.friction, e.bias_scale);
+        }
     }
 
     /// Best particle or peak.

@@ -119,6 +119,8 @@ impl Noise {
         }
     }
 
+    pub(super) fn whites(&self) -> Vec<f64> { self.white.iter().map(|w| w.sqrt()).collect() }
+
     pub(super) fn bias_scales(&self) -> usize {
         BIAS_SCALES.len()
     }
