@@ -1,7 +1,9 @@
 """Fixtures: a domain a test, a peer, and the node as a process that must end well."""
 
+from pathlib import Path
+
 import pytest
-from support import URDF, PalpateNode, Peer, new_domain
+from support import PARTICLES, SAMPLES, URDF, PalpateNode, Peer, new_domain, palpate
 
 
 @pytest.fixture
@@ -39,3 +41,21 @@ def start(domain, tmp_path):
 def node(start):
     """A node with the arm that ships with the project, and few particles."""
     return start(**{"robot.description_file": URDF, "filter.particles": 1000})
+
+
+@pytest.fixture(scope="session")
+def bag(tmp_path_factory):
+    """A bag of the project's own simulator: see contact.yaml."""
+    out = tmp_path_factory.mktemp("simulated") / "contact"
+    palpate("simulate", Path(__file__).with_name("contact.yaml"), "--out", out)
+    return out / "bag"
+
+
+@pytest.fixture(scope="session")
+def parameters(tmp_path_factory):
+    """Few particles, for speed, and a buffer in which nothing is lost however slow the machine is."""
+    path = tmp_path_factory.mktemp("parameters") / "parameters.yaml"
+    values = {"filter.particles": PARTICLES, "input.buffer": 2 * SAMPLES, "seed": 5}
+    lines = [f"    {name}: {value}" for name, value in values.items()]
+    path.write_text("\n".join(["/**:", "  ros__parameters:", *lines]))
+    return path

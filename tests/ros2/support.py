@@ -17,6 +17,9 @@ NODE = Path(os.environ["PALPATE_NODE"])
 URDF = ROOT / "urdf" / "iiwa14.urdf"
 JOINTS = [f"lbr_A{number}" for number in range(1, 8)]
 LIMIT_SECS = 30.0
+# Of the tests with a simulated bag.
+PARTICLES = 2000
+SAMPLES = 600
 
 _domains = itertools.count(os.getpid())
 
@@ -130,6 +133,11 @@ def joint_state(stamp_ns, names):
     message = JointState(name=list(names))
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
     return message
+
+
+def palpate(*arguments):
+    """Runs the command line, which must succeed."""
+    subprocess.run([os.environ["PALPATE"], *arguments, "--quiet"], check=True)
 
 
 def play(bag, domain, *options):

@@ -7,8 +7,9 @@ use palpate_filter::Settings;
 use palpate_model::Robot;
 use palpate_node::{JointInput, MessageCounts, Newest, TimedSample};
 use r2r::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
-use r2r::{Clock, Publisher, QosProfile};
+use r2r::{Publisher, QosProfile};
 
+use crate::clock::Clock;
 use crate::estimation::Progress;
 
 const PERIOD: Duration = Duration::from_secs(1);
@@ -21,6 +22,7 @@ pub struct Diagnostics {
     particles: usize,
     seed: u64,
     progress: Arc<Mutex<Progress>>,
+    clock: Clock,
     next: Instant,
     before: Before,
 }
@@ -51,18 +53,15 @@ impl Diagnostics {
             particles: settings.filter.particles,
             seed: settings.seed,
             progress,
+            clock: Clock::new(node, settings)?,
             next: Instant::now() + PERIOD,
             before: Before::default(),
         })
     }
 
     /// Publishes if a second has passed.
-    pub fn tell(
-        &mut self,
-        node: &r2r::Node,
-        input: &JointInput,
-        samples: &Newest<TimedSample>,
-    ) -> r2r::Result<()> {
+    pub fn tell(&mut self, input: &JointInput, samples: &Newest<TimedSample>) -> r2r::Result<()> {
+        let stamp = self.clock.now();
         let now = Instant::now();
         if now < self.next {
             return Ok(());
@@ -78,16 +77,11 @@ impl Diagnostics {
         };
         progress.steps.sort_unstable();
         let status = self.status(&progress, input, samples.lost());
-        let clock = node.get_ros_clock();
-        let stamp = clock
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get_now()?;
         let mut message = DiagnosticArray {
             status: vec![status],
             ..DiagnosticArray::default()
         };
-        message.header.stamp = Clock::to_builtin_time(&stamp);
+        message.header.stamp = stamp;
         self.publisher.publish(&message)
     }
 

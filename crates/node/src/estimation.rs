@@ -113,7 +113,9 @@ impl Estimation {
             return Ok(());
         };
         let header = messages::header(estimate.stamp_ns, self.robot.root());
-        if let Some(pose) = ContactPose::new(mode) {
+        // Other nodes are not to meet a NaN.
+        let force_is_finite = mode.force_in_root.iter().all(|value| value.is_finite());
+        if let Some(pose) = ContactPose::new(mode).filter(|_| force_is_finite) {
             self.outputs
                 .pose
                 .publish(&messages::pose(&pose, header.clone()))?;

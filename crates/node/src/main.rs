@@ -3,6 +3,7 @@
 //! Three threads: this one takes messages and pairs them, one estimates, one draws. The first never waits for the
 //! second, nor the second for the third.
 
+mod clock;
 mod description;
 mod diagnostics;
 mod drawing;
@@ -67,15 +68,10 @@ fn start() -> anyhow::Result<Started> {
         signal_hook::flag::register(signal, Arc::clone(&stop))
             .context("cannot watch for signals")?;
     }
-    let mut node =
+    let node =
         r2r::Node::create(create_context()?, "palpate", "").context("cannot create the node")?;
     let settings = parameters::read(&node)?;
     parameters::declare(&node, &settings);
-    if settings.use_sim_time {
-        node.get_time_source()
-            .enable_sim_time(&mut node)
-            .context("cannot follow /clock")?;
-    }
     Ok((node, settings, stop))
 }
 

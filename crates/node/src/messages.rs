@@ -16,12 +16,16 @@ use r2r::visualization_msgs::msg::{Marker, MarkerArray};
 /// A header in `frame` with a stamp in nanoseconds.
 pub fn header(stamp_ns: i64, frame: &str) -> Header {
     Header {
-        stamp: Time {
-            // ROS 2 ends in 2038; what lies outside is refused nowhere, so it saturates here.
-            sec: i32::try_from(stamp_ns.div_euclid(1_000_000_000)).unwrap_or(i32::MAX),
-            nanosec: stamp_ns.rem_euclid(1_000_000_000) as u32,
-        },
+        stamp: time(stamp_ns),
         frame_id: frame.to_owned(),
+    }
+}
+
+/// Nanoseconds as ROS 2 writes time, whose seconds end in 2038.
+pub fn time(stamp_ns: i64) -> Time {
+    Time {
+        sec: i32::try_from(stamp_ns.div_euclid(1_000_000_000)).unwrap_or(i32::MAX),
+        nanosec: stamp_ns.rem_euclid(1_000_000_000) as u32,
     }
 }
 

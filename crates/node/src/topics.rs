@@ -61,7 +61,7 @@ pub fn run(
     while !stopped(stop) && !estimating.is_finished() && !drawing.is_finished() {
         node.spin_once(Duration::from_millis(20));
         reader.drain();
-        diagnostics.tell(node, &reader.input, &samples)?;
+        diagnostics.tell(&reader.input, &samples)?;
     }
     samples.close();
     easel.close();
