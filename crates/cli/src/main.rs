@@ -1,8 +1,10 @@
 //! The `palpate` command: where something touches a robot arm, from joint positions and joint torques.
 
+mod demo;
 mod estimates_csv;
 mod inspect;
 mod last_second;
+mod picture;
 mod progress;
 mod recorder;
 mod replay;
@@ -37,6 +39,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Demo(demo::Demo),
     Replay(replay::Replay),
     Simulate(simulate::Simulate),
     Inspect(inspect::Inspect),
@@ -59,6 +62,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     listen(cli.verbose);
     let done = match &cli.command {
+        Command::Demo(demo) => demo.run(),
         Command::Replay(replay) => replay.run(),
         Command::Simulate(simulate) => simulate.run(),
         Command::Inspect(inspect) => inspect.run(),

@@ -1,0 +1,354 @@
+//! `palpate demo`: a simulated contact found again, with nothing but this program.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use comfy_table::Table;
+use palpate_filter::{Filter, Scene, Settings};
+use palpate_model::{IIWA14_URDF, JointSample, LoadOptions, Robot, iiwa14};
+use palpate_sim::{ObstacleKind, Scenario, Trial, Truth};
+
+use crate::last_second::median;
+use crate::picture::{Instant, Moment, Picture};
+use crate::recorder::Recorder;
+use crate::replay::set_threads;
+use crate::simulate::{START_NS, simulate_from_start};
+use crate::track::{Track, track};
+use crate::{Usage, estimates_csv, progress, table};
+
+/// Simulate a contact on an iiwa arm and find it from joint positions and torques alone
+///
+/// Needs no ROS and no files. Prints the estimate against the truth as it converges, and leaves a picture (demo.svg), a
+/// bag for Foxglove, Rerun or RViz (demo.mcap) and the estimates (estimates.csv).
+#[derive(Args)]
+pub struct Demo {
+    /// The touched link: the number of joints that move it, 1 to 7, or its name
+    #[arg(long, value_name = "LINK", default_value = "3")]
+    link: String,
+    /// What touches it
+    #[arg(long, value_enum, default_value_t = Touching::Cylinder)]
+    obstacle: Touching,
+    /// White noise on the torques, in percent of each joint's rms torque
+    #[arg(long, value_name = "PERCENT", default_value_t = 5.0)]
+    noise: f64,
+    /// Seed of the simulation and of the filter
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Number of particles [default: the parameters' default, 10000]
+    #[arg(long, value_name = "N")]
+    particles: Option<usize>,
+    /// Length of the contact, s
+    #[arg(long, value_name = "SECS", default_value_t = 8.0)]
+    secs: f64,
+    /// Number of threads; 0 for one a core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Folder for the results; made if it is not there, earlier results in it are replaced
+    #[arg(long, value_name = "DIR", default_value = "palpate-demo")]
+    out: PathBuf,
+}
+
+/// Obstacles of the demo.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Touching {
+    /// A ball of 30 mm radius
+    Sphere,
+    /// An upright pole of 25 mm radius
+    Cylinder,
+    /// The edge of a cube of 100 mm, rounded by 5 mm
+    Box,
+    /// A flat surface without end
+    Plane,
+}
+
+impl Touching {
+    /// The shape; none for the demo's own.
+    fn kind(self) -> Option<ObstacleKind> {
+        match self {
+            Self::Cylinder => None,
+            Self::Sphere => Some(ObstacleKind::Sphere { radius: 0.03 }),
+            Self::Box => Some(ObstacleKind::Box {
+                half_extents: [0.05; 3],
+                fillet: 0.005,
+            }),
+            Self::Plane => Some(ObstacleKind::Plane {}),
+        }
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Sphere => "ball",
+            Self::Cylinder => "pole",
+            Self::Box => "cube's edge",
+            Self::Plane => "plane",
+        }
+    }
+}
+
+impl Demo {
+    /// Runs the command.
+    pub fn run(&self) -> Result<()> {
+        set_threads(self.threads)?;
+        let robot = iiwa14(&LoadOptions::default())?;
+        let scenario = self.scenario(&robot)?;
+        let spinner = progress::spinner("simulate", false);
+        let trial = simulate_from_start(&robot, &scenario)?;
+        spinner.finish_and_clear();
+        fs::create_dir_all(&self.out)
+            .with_context(|| format!("cannot make the folder {}", self.out.display()))?;
+        let mut settings = Settings::default();
+        settings.filter.particles = self.particles.unwrap_or(settings.filter.particles);
+        table::print(&format!(
+            "A simulated {} touches {} of an iiwa 14; torques with {} % noise, {} particles.\n",
+            self.obstacle.word(),
+            scenario.link,
+            self.noise,
+            settings.filter.particles
+        ))?;
+        let told = self.follow(&robot, &trial, &settings)?;
+        self.write(&robot, &trial, &told, &settings)?;
+        table::print(&told.table(&robot, &trial))?;
+        table::print(&format!(
+            "Written to {0}: demo.svg (the picture), demo.mcap (open it in Foxglove, Rerun or RViz), estimates.csv",
+            self.out.display()
+        ))?;
+        Ok(())
+    }
+
+    fn scenario(&self, robot: &Robot) -> Result<Scenario> {
+        let demo = Scenario::demo(robot)?;
+        let link = robot.links.iter().find(|link| {
+            let number = link.path.len().to_string();
+            link.name == self.link || (number == self.link && link.mesh.is_some())
+        });
+        let link = link.filter(|link| link.mesh.is_some() && !link.path.is_empty());
+        let names = || {
+            let touchable = robot
+                .links
+                .iter()
+                .filter(|l| l.mesh.is_some() && !l.path.is_empty());
+            touchable
+                .map(|link| link.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
+        let wrong = || {
+            Usage(format!(
+                "--link {}: expected 1 to 7 or one of {}",
+                self.link,
+                names()
+            ))
+        };
+        Ok(Scenario {
+            link: link.ok_or_else(wrong)?.name.clone(),
+            obstacle: self.obstacle.kind().unwrap_or(demo.obstacle.clone()),
+            noise_fraction: self.noise / 100.0,
+            duration_secs: self.secs,
+            seed: self.seed,
+            ..demo
+        })
+    }
+
+    /// Runs the filter over the trial, prints how it gets on, and records.
+    fn follow(&self, robot: &Robot, trial: &Trial, settings: &Settings) -> Result<Told> {
+        let path = self.out.join("demo.mcap");
+        let mut recorder = Recorder::create(&path, IIWA14_URDF, START_NS, settings.viz.rate)?;
+        let mut filter = Filter::new(robot, &settings.filter, self.seed)?;
+        let mut told = Told::default();
+        table::print(&LINE_HEAD)?;
+        let bar = progress::bar(trial.samples.len(), "estimate", false);
+        let mut truths = trial.truth.iter();
+        let every = ((0.5 * trial.rate_hz).round() as usize).max(1);
+        let middle = (trial.rate_hz.min(trial.samples.len() as f64 / 4.0)) as usize;
+        let see = |sample: &JointSample, filter: &Filter| {
+            let Some(truth) = truths.next() else {
+                return Ok(());
+            };
+            recorder.sample(robot, filter.kinematics(), sample)?;
+            recorder.estimate(robot, filter)?;
+            recorder.truth(robot, sample.stamp_ns, truth)?;
+            let index = told.history.len();
+            let last = index + 1 == trial.samples.len();
+            let instant = instant(filter, truth);
+            let first_cloud = told.moments.is_empty() && !filter.particles().is_empty();
+            if first_cloud || index == middle || last {
+                told.moments
+                    .push(moment(robot, filter, truth, instant.secs));
+            }
+            if index % every == 0 || last {
+                let line = line(robot, filter, truth, &instant);
+                bar.suspend(|| table::print(&line))?;
+            }
+            told.history.push(instant);
+            bar.inc(1);
+            Ok(())
+        };
+        let jump_secs = settings.input.time_jump_secs;
+        let track = track(&mut filter, robot.dof(), &trial.samples, jump_secs, see)?;
+        bar.finish_and_clear();
+        recorder.finish()?;
+        told.track = Some(track);
+        Ok(told)
+    }
+
+    fn write(&self, robot: &Robot, trial: &Trial, told: &Told, settings: &Settings) -> Result<()> {
+        if let Some(track) = &told.track {
+            estimates_csv::write(&self.out.join("estimates.csv"), robot, &track.estimates)?;
+        }
+        let link = &robot.links[trial.link].name;
+        let picture = Picture {
+            title: "palpate: where is the arm touched?".to_owned(),
+            subtitle: format!(
+                "Simulated iiwa 14, a {} at {link}, {} % torque noise, {} particles, seed {}. {}",
+                self.obstacle.word(),
+                self.noise,
+                settings.filter.particles,
+                self.seed,
+                told.summary()
+            ),
+            robot,
+            touched: trial.link,
+            obstacle: &trial.obstacle,
+            moments: &told.moments,
+            history: &told.history,
+        };
+        match picture.draw() {
+            Some(svg) => write_file(&self.out.join("demo.svg"), &svg),
+            None => Ok(()),
+        }
+    }
+}
+
+fn write_file(path: &Path, text: &str) -> Result<()> {
+    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// What the run told.
+#[derive(Default)]
+struct Told {
+    history: Vec<Instant>,
+    moments: Vec<Moment>,
+    track: Option<Track>,
+}
+
+impl Told {
+    /// The instants of the last second.
+    fn last_second(&self) -> impl Iterator<Item = &Instant> {
+        let end = self.history.last().map_or(0.0, |instant| instant.secs);
+        self.history
+            .iter()
+            .filter(move |instant| instant.secs >= end - 1.0)
+    }
+
+    /// Median error over the last second, m; infinite where there is no estimate.
+    fn error(&self) -> f64 {
+        median(self.last_second().map(|i| i.error.unwrap_or(f64::INFINITY)))
+    }
+
+    /// Time after which the error stays below `limit`, m; s.
+    fn settled_secs(&self, limit: f64) -> Option<f64> {
+        let good = |instant: &&Instant| instant.error.is_some_and(|error| error < limit);
+        self.history
+            .iter()
+            .rev()
+            .take_while(good)
+            .last()
+            .map(|instant| instant.secs)
+    }
+
+    fn summary(&self) -> String {
+        format!("Last second: {} from the truth.", millimetres(self.error()))
+    }
+
+    fn table(&self, robot: &Robot, trial: &Trial) -> Table {
+        let right = self
+            .last_second()
+            .filter(|instant| instant.right_link)
+            .count();
+        let right = 100.0 * right as f64 / self.last_second().count().max(1) as f64;
+        let settled = match self.settled_secs(0.02) {
+            Some(secs) => format!("after {secs:.2} s"),
+            None => "not at the end".to_owned(),
+        };
+        let mut facts = vec![
+            ("touched link", robot.links[trial.link].name.clone()),
+            ("right link in the last second", format!("{right:.0} %")),
+            ("median error in the last second", millimetres(self.error())),
+            ("error stays below 20 mm", settled),
+        ];
+        if let Some(Moment {
+            best: Some(best),
+            truth: Some(truth),
+            ..
+        }) = self.moments.last()
+        {
+            let true_force = truth.force_in_root.norm();
+            let forces = format!("{:.1} N estimated, {true_force:.1} N true", best.force);
+            facts.push(("force at the end", forces));
+        }
+        if let Some(track) = &self.track {
+            let secs = track.filter_time.as_secs_f64();
+            let speed = track.span_secs() / secs.max(1e-9);
+            facts.push(("filter", format!("{secs:.2} s, {speed:.1} × real time")));
+        }
+        table::facts(&facts)
+    }
+}
+
+fn millimetres(metres: f64) -> String {
+    if metres.is_finite() {
+        format!("{:.1} mm", 1e3 * metres)
+    } else {
+        "no estimate".to_owned()
+    }
+}
+
+fn instant(filter: &Filter, truth: &Truth) -> Instant {
+    let estimate = filter.estimate();
+    let best = estimate.best();
+    let pair = best.zip(truth.contact.as_ref());
+    Instant {
+        secs: truth.stamp_ns as f64 * 1e-9,
+        status: estimate.status,
+        error: pair.map(|(mode, contact)| (mode.point_in_root - contact.point_in_root).norm()),
+        std: best.map(|mode| mode.std()),
+        right_link: best.is_some_and(|mode| mode.link == truth.link),
+    }
+}
+
+fn moment(robot: &Robot, filter: &Filter, truth: &Truth, secs: f64) -> Moment {
+    let (kinematics, estimate) = (filter.kinematics(), filter.estimate());
+    let scene = Scene::new(robot, kinematics, estimate, filter.particles());
+    Moment {
+        secs,
+        kinematics: kinematics.clone(),
+        cloud: scene.cloud,
+        best: estimate.best().cloned(),
+        truth: truth.contact,
+    }
+}
+
+const LINE_HEAD: &str =
+    "  time  status     link         prob.    error    std   force estimated / true";
+
+fn line(robot: &Robot, filter: &Filter, truth: &Truth, instant: &Instant) -> String {
+    let start = format!("{:5.2} s  {:9}", instant.secs, instant.status.word());
+    let true_force = truth
+        .contact
+        .map_or(0.0, |contact| contact.force_in_root.norm());
+    let Some(mode) = filter.estimate().best() else {
+        return format!("{start}  –                                   – / {true_force:.1} N");
+    };
+    let error = instant
+        .error
+        .map_or("–".to_owned(), |error| format!("{:.1} mm", 1e3 * error));
+    let std = format!("{:.1} mm", 1e3 * mode.std());
+    format!(
+        "{start}  {:11} {:4.0} %  {error:>8} {std:>8}  {:6.1} N / {true_force:.1} N",
+        robot.links[mode.link].name,
+        100.0 * mode.probability,
+        mode.force
+    )
+}
