@@ -21,7 +21,7 @@ impl Estimator {
         let count = parameters.particles;
         match parameters.method {
             Method::Paper => Self::Paper(PaperFilter::new(parameters.paper.clone(), count, robot.links.len(), seed)),
-            Method::Palpate => Self::Palpate(PalpateFilter::new(robot, count, seed)),
+            Method::Palpate => Self::Palpate(PalpateFilter::new(robot, parameters.palpate.clone(), seed)),
         }
     }
 

@@ -20,6 +20,7 @@ pub use detector::DetectorParameters;
 pub use estimate::{ContactEstimate, ContactStatus, Mode};
 pub use filter::Filter;
 pub use intake::{Admitted, Intake, IntakeCounts, Refusal};
+pub use palpate::PalpateParameters;
 pub use paper::{MotionModel, PaperParameters};
 pub use parameters::{Method, ParameterError, Parameters};
 pub use particle::Particle;

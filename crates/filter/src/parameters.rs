@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::detector::DetectorParameters;
+use crate::palpate::PalpateParameters;
 use crate::paper::PaperParameters;
 
 /// How contacts are estimated.
@@ -22,7 +23,7 @@ pub enum Method {
 pub struct Parameters {
     /// The method: `paper` or `palpate`. Default `palpate`.
     pub method: Method,
-    /// Number of particles. Default 10,000.
+    /// Number of particles of the paper's filter. Default 10,000.
     pub particles: usize,
     /// A contact counts as located when its first mode has at least this probability. Default 0.6.
     pub located_probability: f64,
@@ -30,6 +31,8 @@ pub struct Parameters {
     pub located_std: f64,
     /// When something touches.
     pub detector: DetectorParameters,
+    /// This project's filter.
+    pub palpate: PalpateParameters,
     /// The paper's filter.
     pub paper: PaperParameters,
 }
@@ -42,6 +45,7 @@ impl Default for Parameters {
             located_probability: 0.6,
             located_std: 0.03,
             detector: DetectorParameters::default(),
+            palpate: PalpateParameters::default(),
             paper: PaperParameters::default(),
         }
     }
@@ -75,6 +79,7 @@ impl Parameters {
             self.located_std > 0.0,
         )?;
         self.detector.check()?;
+        self.palpate.check()?;
         self.paper.check()
     }
 }

@@ -92,8 +92,9 @@ impl RobotSettings {
 pub struct InputSettings {
     /// Stamps of a position and a torque that belong together differ by at most this, s. Default 0.02.
     pub pairing_tolerance_secs: f64,
-    /// So many paired samples wait for the filter at most; then the oldest is lost, and counted. Default 16.
-    pub buffer: usize,
+    /// A sample that is older than the newest by more than this, s, is lost where the filter has not come to it, and
+    /// counted: where the filter is too slow, the newest data wins. Default 0.5.
+    pub max_wait_secs: f64,
     /// A stamp that lies further back than this, s, means that time has started anew, as when a bag is played again:
     /// everything learned is forgotten. Smaller steps back are refused. Default 1.
     pub time_jump_secs: f64,
@@ -103,7 +104,7 @@ impl Default for InputSettings {
     fn default() -> Self {
         Self {
             pairing_tolerance_secs: 0.02,
-            buffer: 16,
+            max_wait_secs: 0.5,
             time_jump_secs: 1.0,
         }
     }
@@ -255,12 +256,12 @@ impl Settings {
             tolerance,
             (0.0..=10.0).contains(&tolerance),
         )?;
-        let buffer = self.input.buffer;
+        let wait = self.input.max_wait_secs;
         in_range(
-            "input.buffer",
-            "1 to 10000",
-            buffer,
-            (1..=10_000).contains(&buffer),
+            "input.max_wait_secs",
+            "0 to 3600",
+            wait,
+            (0.0..=3600.0).contains(&wait),
         )?;
         let jump = self.input.time_jump_secs;
         in_range("input.time_jump_secs", "0 or more", jump, jump >= 0.0)?;
@@ -391,9 +392,9 @@ mod tests {
 
     #[test]
     fn an_unknown_key_is_named_with_its_section() {
-        let said = refusal("/**: {ros__parameters: {input: {bufer: 3}}}");
-        assert!(said.contains("input.bufer"), "{said}");
-        assert!(said.contains("buffer"), "{said}");
+        let said = refusal("/**: {ros__parameters: {input: {max_wait: 3}}}");
+        assert!(said.contains("input.max_wait:"), "{said}");
+        assert!(said.contains("max_wait_secs"), "{said}");
         let said = refusal("/**: {ros__parameters: {bogus: 3}}");
         assert!(said.contains("bogus"), "{said}");
     }

@@ -1,128 +1,176 @@
-//! Markov chain moves that leave the posterior as it is.
+//! Markov chain moves that leave the posterior as it is (Metropolis and Hastings).
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Unit, Vector3};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
 use super::Hypothesis;
-use super::memory::Keyframe;
-use super::noise::Noise;
+use super::chart::tangential;
+use super::history::History;
+use super::obstacle::{Core, Obstacle};
 use super::peaks::Peak;
-use super::obstacle::{log_prior, touch};
-use crate::step::Step;
 
-/// Indices of the particles on each link.
-pub(super) fn by_link(particles: &[Hypothesis], links: usize) -> Vec<Vec<u32>> {
-    let mut lists = vec![Vec::new(); links];
-    for (index, particle) in particles.iter().enumerate() {
-        lists[particle.obstacle.link as usize].push(index as u32);
-    }
-    lists
+/// How far a slide goes, m, and how far a radial move on the logarithm of the radius.
+const SLIDES: [f64; 4] = [2e-4, 1e-3, 5e-3, 2e-2];
+const RADIAL: [f64; 3] = [0.02, 0.1, 0.5];
+
+/// What the moves draw on besides the particle itself.
+pub(super) struct Proposals<'a> {
+    history: History<'a>,
+    others: &'a [Hypothesis],
+    /// Indices of the others by link and kind: balls at 2 × link, bars at 2 × link + 1.
+    akin: Vec<Vec<u32>>,
+    peaks: &'a [Peak],
+    /// Share of the draws that each peak has; they sum to one.
+    shares: Vec<f64>,
 }
 
-#[allow(clippy::too_many_arguments)]
-pub(super) fn mutate(
-    particle: &mut Hypothesis,
-    temperature: f64,
-    others: &[Hypothesis],
-    by_link: &[Vec<u32>],
-    peaks: &[Peak],
-    step: &Step,
-    keyframes: &[Keyframe],
-    noise: &Noise,
-    random: &mut impl Rng,
-) {
-    if !peaks.is_empty() && random.random::<f64>() < 0.3 {
-        jump(particle, temperature, peaks, step, keyframes, noise, random);
-        return;
+impl<'a> Proposals<'a> {
+    pub(super) fn new(
+        history: History<'a>,
+            others: &'a [Hypothesis],
+        peaks: &'a [Peak],
+    ) -> Self {
+        let mut akin = vec![Vec::new(); 2 * history.robot.links.len()];
+        for (index, other) in others.iter().enumerate() {
+            akin[kind(&other.obstacle)].push(index as u32);
+        }
+        let top = peaks.iter().map(|peak| peak.log_mass).fold(f64::NEG_INFINITY, f64::max);
+        // Tempered, and with something for each, so that every peak is tried.
+        let share = |peak: &Peak| 0.2 / peaks.len() as f64 + (0.5 * (peak.log_mass - top)).exp();
+        let total: f64 = peaks.iter().map(share).sum();
+        let shares = peaks.iter().map(|peak| share(peak) / total).collect();
+        Self { history, others, akin, peaks, shares }
     }
-    let link = particle.obstacle.link as usize;
-    let surface = step.skin.surface(link);
-    let newest = &keyframes[keyframes.len() - 1].links[link];
-    let centre = newest.link_from_root * particle.obstacle.centre;
-    let here = touch(surface, &centre, Some(particle.obstacle.triangle));
-    let mut normal = || random.sample::<f64, _>(StandardNormal);
-    let gauss = Vector3::new(normal(), normal(), normal());
-    let radial_gauss = normal();
-    let kind: f64 = random.random();
-    let mut radial = 0.0;
-    let proposed = if kind < 0.5 && by_link[link].len() > 8 {
-        let list = &by_link[link];
-        let mut pick = || others[list[random.random_range(0..list.len())] as usize].obstacle.centre;
-        let (a, b) = (pick(), pick());
-        // Ter Braak 2006: γ = 2.38 / √(2 d), now and then 1 to jump between modes.
-        let gamma = if random.random::<f64>() < 0.1 { 1.0 } else { 0.97 * random.random::<f64>().sqrt() };
-        centre + newest.link_from_root.rotation * ((a - b) * gamma) + gauss * 1e-5
-    } else if kind < 0.7 {
-        radial = radial_gauss * [0.02, 0.1, 0.5][random.random_range(0..3)];
-        here.point + (centre - here.point) * f64::exp(radial)
-    } else {
-        // Slide on the surface: sideways in proportion to the distance from the link's own axis.
-        let size = [2e-4, 1e-3, 5e-3, 2e-2][random.random_range(0..4)];
-        let sideways = gauss - here.normal.into_inner() * gauss.dot(&here.normal);
-        centre + sideways * (size * (1.0 + here.distance.abs() / 0.07))
-    };
-    let mut obstacle = particle.obstacle;
-    let start = if (proposed - centre).norm() < 0.01 { Some(here.triangle) } else { None };
-    let there = touch(surface, &proposed, start);
-    let prior = log_prior(there.distance);
-    if prior == f64::NEG_INFINITY {
-        return;
+
+    /// Makes one move of a kind chosen at random.
+    pub(super) fn mutate(&self, particle: &mut Hypothesis, random: &mut impl Rng) {
+        match random.random::<f64>() {
+            r if r < 0.3 => self.jump(particle, random),
+            r if r < 0.55 => self.wander(particle, random),
+            r if r < 0.75 => self.differ(particle, random),
+            r if r < 0.85 => self.breathe(particle, random),
+            _ => self.slide(particle, random),
+        }
     }
-    obstacle.centre = newest.link_from_root.inverse_transform_point(&proposed);
-    obstacle.triangle = there.triangle;
-    let evidence = obstacle.evidence(step.robot, step.skin, keyframes, noise);
-    // The radial move keeps (p, log r) uniform, which the prior is: only the evidence decides.
-    let priors = if radial != 0.0 { 0.0 } else { prior - log_prior(here.distance) };
-    let log_ratio = temperature * (evidence.log - particle.evidence.log) + priors;
-    if random.random::<f64>().ln() < log_ratio {
-        particle.obstacle = obstacle;
-        particle.evidence = evidence;
-        particle.log_prior = prior;
+
+    /// Accepts or refuses a proposed core. `log_proposal` is the log of the proposal density back over that forth.
+    fn decide(
+        &self,
+        particle: &mut Hypothesis,
+        mut obstacle: Obstacle,
+        log_proposal: f64,
+        random: &mut impl Rng,
+    ) {
+        let evidence = self.history.evidence(&mut obstacle);
+        let log_prior = obstacle.log_prior(evidence.reference);
+        let log_ratio = evidence.log - particle.evidence.log + log_prior
+            - particle.log_prior
+            + log_proposal;
+        if random.random::<f64>().ln() < log_ratio {
+            *particle = Hypothesis { obstacle, evidence, log_prior, ..*particle };
+        }
+    }
+
+    fn pick_peak(&self, random: &mut impl Rng) -> Option<&Peak> {
+        let mut wanted = random.random::<f64>();
+        self.peaks.iter().zip(&self.shares).find_map(|(peak, share)| {
+            wanted -= share;
+            (wanted <= 0.0).then_some(peak)
+        })
+    }
+
+    /// An independent draw from the peaks, on whatever link and of whatever kind: how particles change modes.
+    fn jump(&self, particle: &mut Hypothesis, random: &mut impl Rng) {
+        let Some(peak) = self.pick_peak(random) else { return };
+        let core = peak.draw(&self.history, random);
+        let obstacle = Obstacle { core, ..peak.obstacle };
+        let log_density = |obstacle: &Obstacle| {
+            let akin = self.peaks.iter().zip(&self.shares).filter(|(peak, _)| peak.is_akin(obstacle));
+            let terms: f64 = akin.map(|(peak, share)| share * peak.log_density(&obstacle.core).exp()).sum();
+            terms.max(f64::MIN_POSITIVE).ln()
+        };
+        let back_over_forth = log_density(&particle.obstacle) - log_density(&obstacle);
+        self.decide(particle, obstacle, back_over_forth, random);
+    }
+
+    /// A random walk with the shape of a peak's Gaussian.
+    fn wander(&self, particle: &mut Hypothesis, random: &mut impl Rng) {
+        let Some(peak) = self.pick_peak(random) else { return };
+        if !peak.is_akin(&particle.obstacle) {
+            return;
+        }
+        let Some((x, log_volume)) = peak.coordinates(&particle.obstacle.core) else { return };
+        let deviations = [0.1, 0.4, 1.2][random.random_range(0..3)];
+        let core = peak.displaced(&x, deviations, &self.history, random);
+        let Some((_, new_log_volume)) = peak.coordinates(&core) else { return };
+        let obstacle = Obstacle { core, ..particle.obstacle };
+        self.decide(particle, obstacle, new_log_volume - log_volume, random);
+    }
+
+    /// Differential evolution: along the difference of two others (ter Braak 2006).
+    fn differ(&self, particle: &mut Hypothesis, random: &mut impl Rng) {
+        let akin = &self.akin[kind(&particle.obstacle)];
+        if akin.len() < 8 {
+            return;
+        }
+        let mut pick = || self.others[akin[random.random_range(0..akin.len())] as usize].obstacle.core;
+        let (one, other) = (pick(), pick());
+        // γ = 2.38 / √(2 d) or less, now and then 1 to jump between modes.
+        let gamma = match random.random::<f64>() < 0.1 {
+            true => 1.0,
+            false => 0.97 * random.random::<f64>().sqrt(),
+        };
+        let core = particle.obstacle.core;
+        let centre = core.centre + (one.centre - other.centre) * gamma + gauss(random) * 1e-5;
+        let axis = core.axis.zip(one.axis).zip(other.axis).map(|((own, one), other)| {
+            let sign = if one.dot(&other) < 0.0 { -1.0 } else { 1.0 };
+            let turned = own.into_inner() + (one.into_inner() - other.into_inner() * sign) * gamma;
+            Unit::new_normalize(turned)
+        });
+        let obstacle = Obstacle { core: Core { centre, axis }, ..particle.obstacle };
+        self.decide(particle, obstacle, 0.0, random);
+    }
+
+    /// Changes the radius only: the contact stays.
+    fn breathe(&self, particle: &mut Hypothesis, random: &mut impl Rng) {
+        let change = random.sample::<f64, _>(StandardNormal) * RADIAL[random.random_range(0..RADIAL.len())];
+        let touch = self.history.newest_touch(&particle.obstacle);
+        let root_from_link = self.history.newest_link_from_root(particle.obstacle.link).inverse();
+        let foot = root_from_link * touch.point;
+        let core = particle.obstacle.core;
+        let obstacle = Obstacle {
+            core: Core { centre: foot + (core.centre - foot) * change.exp(), ..core },
+            ..particle.obstacle
+        };
+        // Uniform in the logarithm of the radius, as the prior is: the densities in space undo the priors.
+        let distance = touch.distance;
+        let back_over_forth = particle.obstacle.log_prior(distance) - obstacle.log_prior(distance * change.exp());
+        self.decide(particle, obstacle, back_over_forth, random);
+    }
+
+    /// Slides along the surface, the farther the larger the radius; a bar turns as well.
+    fn slide(&self, particle: &mut Hypothesis, random: &mut impl Rng) {
+        let touch = self.history.newest_touch(&particle.obstacle);
+        let root_from_link = self.history.newest_link_from_root(particle.obstacle.link).inverse();
+        let normal = root_from_link.rotation * touch.normal;
+        let size = SLIDES[random.random_range(0..SLIDES.len())];
+        let way = gauss(random);
+        let sideways = way - normal.into_inner() * way.dot(&normal);
+        let core = particle.obstacle.core;
+        let spread = 1.0 + touch.distance.abs() / super::obstacle::LINK_RADIUS;
+        let centre: Point3<f64> = core.centre + sideways * (size * spread);
+        let turn = random.sample::<f64, _>(StandardNormal) * size * 20.0;
+        let axis = core.axis.map(|axis| tangential(&axis, &normal, turn));
+        let obstacle = Obstacle { core: Core { centre, axis }, ..particle.obstacle };
+        self.decide(particle, obstacle, 0.0, random);
     }
 }
 
-/// An independent draw from the Laplace approximations of all peaks, on whatever link: how particles change modes.
-fn jump(
-    particle: &mut Hypothesis,
-    temperature: f64,
-    peaks: &[Peak],
-    step: &Step,
-    keyframes: &[Keyframe],
-    noise: &Noise,
-    random: &mut impl Rng,
-) {
-    let top = peaks.iter().map(|peak| peak.log_mass).fold(f64::NEG_INFINITY, f64::max);
-    // Tempered, and with a share for each, so that every peak is tried.
-    let share = |peak: &Peak| 0.2 / peaks.len() as f64 + (0.5 * (peak.log_mass - top)).exp();
-    let total: f64 = peaks.iter().map(share).sum();
-    let mut wanted = random.random::<f64>() * total;
-    let chosen = peaks.iter().find(|peak| {
-        wanted -= share(peak);
-        wanted <= 0.0
-    });
-    let Some(peak) = chosen else { return };
-    let Some(centre) = peak.draw(random) else { return };
-    let log_density = |link: u16, centre: &nalgebra::Point3<f64>| {
-        let on_link = peaks.iter().filter(|peak| peak.obstacle.link == link);
-        let terms: f64 = on_link.map(|peak| share(peak) * peak.log_density(centre).exp()).sum();
-        terms.max(1e-300).ln()
-    };
-    let link = peak.obstacle.link;
-    let view = &keyframes[keyframes.len() - 1].links[link as usize];
-    let there = touch(step.skin.surface(link as usize), &(view.link_from_root * centre), Some(peak.obstacle.triangle));
-    let prior = log_prior(there.distance);
-    if prior == f64::NEG_INFINITY {
-        return;
-    }
-    let mut obstacle = crate::palpate::obstacle::Obstacle { link, triangle: there.triangle, centre };
-    let evidence = obstacle.evidence(step.robot, step.skin, keyframes, noise);
-    let forth = log_density(link, &centre);
-    let back = log_density(particle.obstacle.link, &particle.obstacle.centre);
-    let log_ratio = temperature * (evidence.log - particle.evidence.log) + prior - particle.log_prior + back - forth;
-    if random.random::<f64>().ln() < log_ratio {
-        particle.obstacle = obstacle;
-        particle.evidence = evidence;
-        particle.log_prior = prior;
-    }
+fn kind(obstacle: &Obstacle) -> usize {
+    2 * obstacle.link as usize + usize::from(obstacle.core.axis.is_some())
+}
+
+fn gauss(random: &mut impl Rng) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| random.sample::<f64, _>(StandardNormal))
 }

@@ -1,6 +1,11 @@
 //! What is known of the torques' noise: white noise by joint, a slow part, and a constant bias of unknown scale.
 
+use palpate_model::Robot;
+
+use super::evidence::Evidence;
 use super::memory::Keyframe;
+use super::obstacle::Obstacle;
+use crate::skin::Skin;
 
 /// Standard deviations that a bias may have, Nm: which one fits, the data tell.
 const BIAS_SCALES: [f64; 3] = [0.004, 0.05, 0.25];
@@ -9,6 +14,10 @@ const FLOOR: f64 = 0.01;
 const FLOOR_SHARE: f64 = 0.01;
 /// Time over which that part is one and the same, s.
 const FLOOR_SECS: f64 = 0.2;
+
+/// Fewest residuals that the noise is calibrated by, and the number that the belief in the model is worth.
+const LEAST_RESIDUALS: f64 = 6.0;
+const PRIOR_RESIDUALS: f64 = 8.0;
 
 /// The effect of a bias of one scale on one joint's sums.
 #[derive(Clone, Copy, Debug, Default)]
@@ -88,13 +97,32 @@ impl Noise {
         1.0 / (self.inflation[joint] * (self.white[joint] / keyframe.samples + slow))
     }
 
-    /// Sets how much larger than expected the residuals are: mean square of the normalised residuals by joint.
-    pub(super) fn inflate(&mut self, joint: usize, factor: f64) {
-        self.inflation[joint] = factor.clamp(1.0, 1e4);
-    }
-
-    pub(super) fn inflation(&self, joint: usize) -> f64 {
-        self.inflation[joint]
+    /// Learns from the residuals of the best hypothesis how much larger they are than expected, joint by joint.
+    pub(super) fn calibrate(
+        &mut self,
+        obstacle: &Obstacle,
+        evidence: &Evidence,
+        robot: &Robot,
+        skin: &Skin,
+        keyframes: &[Keyframe],
+    ) {
+        let mut sums = vec![[0.0; 4]; self.white.len()];
+        obstacle.residuals(evidence, robot, skin, keyframes, self, |joint, residual, weight| {
+            let sum = &mut sums[joint];
+            sum[0] += 1.0;
+            sum[1] += weight;
+            sum[2] += weight * residual;
+            sum[3] += weight * residual * residual;
+        });
+        for (inflation, [count, weight, first, second]) in self.inflation.iter_mut().zip(sums) {
+            if count < LEAST_RESIDUALS {
+                continue;
+            }
+            // The mean is the bias's business.
+            let squares = (second - first * first / weight) * *inflation;
+            let factor = (squares + PRIOR_RESIDUALS) / (count - 1.0 + PRIOR_RESIDUALS);
+            *inflation = factor.clamp(1.0, 1e4);
+        }
     }
 
     /// Sums over the history what all hypotheses share.
@@ -118,8 +146,6 @@ impl Noise {
             }
         }
     }
-
-    pub(super) fn whites(&self) -> Vec<f64> { self.white.iter().map(|w| w.sqrt()).collect() }
 
     pub(super) fn bias_scales(&self) -> usize {
         BIAS_SCALES.len()

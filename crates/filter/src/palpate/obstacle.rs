@@ -1,6 +1,6 @@
-//! A hypothesis about the obstacle: locally a sphere that rests in the world, pressed against one link.
+//! A hypothesis about the obstacle: locally a ball or a bar that rests in the world, pressed against one link.
 
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use palpate_model::{Robot, Surface};
 
 use super::evidence::{Evidence, JointTorque, Sums};
@@ -10,20 +10,43 @@ use crate::skin::Skin;
 
 /// Speed at which friction has half its strength, m/s: below it the contact rather sticks.
 const STICKING_SPEED: f64 = 5e-4;
-
+/// Half the length of a bar, m.
+const BAR_HALF_LENGTH: f64 = 0.3;
+/// How exactly the contact along a bar is found, m; it costs a projection an iteration.
+const BAR_TOLERANCE: f64 = 1e-5;
 /// Typical radius of a link, m.
 pub(super) const LINK_RADIUS: f64 = 0.07;
 /// Smallest and largest radius of an obstacle's curvature, m.
 pub(super) const RADIUS_RANGE: [f64; 2] = [1e-3, 1.0];
 
-/// The centre of the obstacle's curvature, and the link that it touches.
+/// The core of the obstacle, in some frame: a point, or a line for poles and edges. Its surface is at an unknown
+/// radius r around the core, which the stiffness and force absorb.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Core {
+    /// Centre c of the curvature: the point of the core nearest to the link, m.
+    pub(super) centre: Point3<f64>,
+    /// Direction of a bar; none for a ball.
+    pub(super) axis: Option<Unit<Vector3<f64>>>,
+}
+
+impl Core {
+    /// The same core in another frame.
+    pub(super) fn moved(&self, a_from_b: &Isometry3<f64>) -> Self {
+        Self {
+            centre: a_from_b * self.centre,
+            axis: self.axis.map(|axis| a_from_b.rotation * axis),
+        }
+    }
+}
+
+/// An obstacle and the link that it touches.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Obstacle {
     pub(super) link: u16,
     /// Triangle that the contact was on when last looked at: where the next projection starts.
     pub(super) triangle: u32,
-    /// Centre c in the root frame, m.
-    pub(super) centre: Point3<f64>,
+    /// The core in the root frame.
+    pub(super) core: Core,
 }
 
 /// Where an obstacle touches its link in one configuration.
@@ -32,29 +55,62 @@ pub(super) struct Touch {
     /// Contact point p in the link's frame, m.
     pub(super) point: Point3<f64>,
     pub(super) triangle: u32,
-    /// Outward normal: from p to c.
+    /// Outward normal: from p to the core.
     pub(super) normal: Unit<Vector3<f64>>,
-    /// Distance from c to the link, m; negative inside.
+    /// Distance d from the core to the link, m; negative inside.
     pub(super) distance: f64,
+    /// Way from the core's centre to its point nearest to the link, along a bar's axis, m.
+    pub(super) along: f64,
 }
 
-/// The contact: the link's point nearest to c (the paper's figure 2).
-pub(super) fn touch(surface: &Surface, centre_in_link: &Point3<f64>, start: Option<u32>) -> Touch {
-    let nearest = match start {
-        Some(triangle) => surface.closest_point_from(centre_in_link, triangle),
-        None => surface.closest_point(centre_in_link),
+/// The contact: the link's point nearest to the core (the paper's figure 2). For a bar, `along` is a first guess of
+/// the way along its axis.
+pub(super) fn touch(surface: &Surface, core_in_link: &Core, start: u32, along: f64) -> Touch {
+    let Some(axis) = core_in_link.axis else {
+        return touch_ball(surface, &core_in_link.centre, start);
     };
+    let at = |along: f64, start: u32| {
+        let centre = core_in_link.centre + axis.into_inner() * along;
+        let touch = touch_ball(surface, &centre, start);
+        // Zero where the point of the bar is the one nearest to its own projection.
+        let miss = axis.dot(&(touch.point - centre));
+        (Touch { along, ..touch }, miss)
+    };
+    let (mut best, mut miss) = at(along, start);
+    let mut slope = -0.5;
+    for _ in 0..6 {
+        if miss.abs() < BAR_TOLERANCE {
+            break;
+        }
+        let next = (best.along - miss / slope).clamp(-BAR_HALF_LENGTH, BAR_HALF_LENGTH);
+        if next == best.along {
+            break;
+        }
+        let (touch, next_miss) = at(next, best.triangle);
+        // On a convex link the slope lies between −1 and 0.
+        slope = ((next_miss - miss) / (next - best.along)).clamp(-1.0, -0.05);
+        (best, miss) = (touch, next_miss);
+    }
+    best
+}
+
+/// The contact with a ball around `centre`.
+fn touch_ball(surface: &Surface, centre: &Point3<f64>, start: u32) -> Touch {
+    let nearest = surface.closest_point_from(centre, start);
     let face = surface.normal(nearest.triangle);
-    let away = centre_in_link - nearest.point;
+    let away = centre - nearest.point;
     let distance = away.norm();
     let side = if away.dot(&face) < 0.0 { -1.0 } else { 1.0 };
-    let normal = if distance > 1e-7 { Unit::new_unchecked(away * (side / distance)) } else { face };
-    Touch { point: nearest.point, triangle: nearest.triangle, normal, distance: side * distance }
+    let normal = match distance > 1e-7 {
+        true => Unit::new_unchecked(away * (side / distance)),
+        false => face,
+    };
+    Touch { point: nearest.point, triangle: nearest.triangle, normal, distance: side * distance, along: 0.0 }
 }
 
 impl LinkView {
     /// Direction of the friction on the link at a touch, in the link's frame: against the slip, shorter when slow.
-    pub(super) fn friction_direction(&self, touch: &Touch) -> Vector3<f64> {
+    fn friction_direction(&self, touch: &Touch) -> Vector3<f64> {
         let linear: Vector3<f64> = self.velocity.fixed_rows::<3>(0).into_owned();
         let angular: Vector3<f64> = self.velocity.fixed_rows::<3>(3).into_owned();
         let velocity = linear + angular.cross(&touch.point.coords);
@@ -64,25 +120,62 @@ impl LinkView {
 }
 
 impl Obstacle {
-    /// The evidence of the whole history for this obstacle. Updates the triangle to that of the newest keyframe.
+    /// Where it touches, in the configuration that `link_from_root` belongs to.
+    pub(super) fn touch(&self, skin: &Skin, link_from_root: &Isometry3<f64>) -> Touch {
+        touch(skin.surface(self.link as usize), &self.core.moved(link_from_root), self.triangle, 0.0)
+    }
+
+    /// The evidence of the whole history for this obstacle. Puts triangle and centre where the newest keyframe has
+    /// the contact.
     pub(super) fn evidence(&mut self, robot: &Robot, skin: &Skin, keyframes: &[Keyframe], noise: &Noise) -> Evidence {
         let link = self.link as usize;
-        let (surface, path) = (skin.surface(link), &robot.links[link].path);
+        let path = &robot.links[link].path;
         let mut sums = Sums::default();
-        let mut start = Some(self.triangle);
-        let mut reference = None;
-        for keyframe in keyframes.iter().rev() {
-            let view = &keyframe.links[link];
-            let touch = touch(surface, &(view.link_from_root * self.centre), start);
-            if start.is_none() || reference.is_none() {
-                self.triangle = touch.triangle;
-            }
-            start = Some(touch.triangle);
-            let e = *reference.get_or_insert(touch.distance) - touch.distance;
-            sums.add(e, joint_torques(view, keyframe, &touch, path, noise));
+        let mut newest: Option<Touch> = None;
+        self.follow(skin, keyframes, |_, keyframe, touch| {
+            let e = newest.get_or_insert(touch).distance - touch.distance;
+            sums.add(e, joint_torques(&keyframe.links[link], keyframe, &touch, path, noise));
+        });
+        let Some(newest) = newest else { return Evidence::default() };
+        self.triangle = newest.triangle;
+        if let Some(axis) = self.core.axis {
+            self.core.centre += axis.into_inner() * newest.along;
         }
-        let reference = reference.unwrap_or(0.0);
-        Evidence { reference, ..sums.evidence(noise, path) }
+        Evidence { reference: newest.distance, ..sums.evidence(noise, path) }
+    }
+
+    /// Follows the contact through the keyframes, from the newest to the oldest.
+    fn follow<'a>(&self, skin: &Skin, keyframes: &'a [Keyframe], mut visit: impl FnMut(usize, &'a Keyframe, Touch)) {
+        let link = self.link as usize;
+        let (mut start, mut along) = (self.triangle, 0.0);
+        for (index, keyframe) in keyframes.iter().enumerate().rev() {
+            let core = self.core.moved(&keyframe.links[link].link_from_root);
+            let touch = touch(skin.surface(link), &core, start, along);
+            (start, along) = (touch.triangle, touch.along);
+            visit(index, keyframe, touch);
+        }
+    }
+
+    /// What the solved hypothesis leaves of the history's torques: calls `take(joint, residual, weight)`.
+    pub(super) fn residuals(
+        &self,
+        evidence: &Evidence,
+        robot: &Robot,
+        skin: &Skin,
+        keyframes: &[Keyframe],
+        noise: &Noise,
+        mut take: impl FnMut(usize, f64, f64),
+    ) {
+        let link = self.link as usize;
+        let path = &robot.links[link].path;
+        self.follow(skin, keyframes, |_, keyframe, touch| {
+            let force = evidence.force + evidence.stiffness * (evidence.reference - touch.distance);
+            let torques = joint_torques(&keyframe.links[link], keyframe, &touch, path, noise);
+            for (torque, &joint) in torques.zip(path) {
+                let predicted = (torque.normal + evidence.friction * torque.tangential) * force;
+                take(joint, torque.measured - predicted, torque.weight);
+            }
+        });
     }
 }
 
@@ -111,39 +204,25 @@ fn joint_torques<'a>(
     })
 }
 
-/// Residuals of the history's torques for a solved hypothesis: calls `take(joint, squared normalised residual)`.
-pub(super) fn residuals(
-    obstacle: &Obstacle,
-    evidence: &Evidence,
-    robot: &Robot,
-    skin: &Skin,
-    keyframes: &[Keyframe],
-    noise: &Noise,
-    mut take: impl FnMut(usize, usize, f64, f64),
-) {
-    let link = obstacle.link as usize;
-    let (surface, path) = (skin.surface(link), &robot.links[link].path);
-    let mut start = Some(obstacle.triangle);
-    let mut reference = None;
-    for (index, keyframe) in keyframes.iter().enumerate().rev() {
-        let view = &keyframe.links[link];
-        let touch = touch(surface, &(view.link_from_root * obstacle.centre), start);
-        start = Some(touch.triangle);
-        let e = *reference.get_or_insert(touch.distance) - touch.distance;
-        let force = evidence.force + evidence.stiffness * e;
-        for (joint, &name) in joint_torques(view, keyframe, &touch, path, noise).zip(path) {
-            let predicted = (joint.normal + evidence.friction * joint.tangential) * force;
-            take(index, name, joint.measured - predicted, joint.weight);
-        }
+impl Obstacle {
+    /// Log of the prior density of an obstacle that touches at `distance` (m), in space: contact points uniform over
+    /// the surface and radii uniform in log space, on a link that is itself about [`LINK_RADIUS`] round; balls and
+    /// bars alike, the bars in any direction along the surface.
+    pub(super) fn log_prior(&self, distance: f64) -> f64 {
+        let radius = distance.max(RADIUS_RANGE[0]);
+        let direction = if self.core.axis.is_some() { -std::f64::consts::PI.ln() } else { 0.0 };
+        direction - radius.ln() - 2.0 * (radius + LINK_RADIUS).ln() + log_radius_prior(distance)
     }
 }
 
-/// Log of the prior density of an obstacle whose centre lies at `distance` from the link: contact points uniform over
-/// the surface and radii uniform in log space, on a link that is itself about `LINK_RADIUS` round.
-pub(super) fn log_prior(distance: f64) -> f64 {
-    if distance > RADIUS_RANGE[1] || distance < -0.01 {
-        return f64::NEG_INFINITY;
+/// Log of the prior on the logarithm of the radius: flat within [`RADIUS_RANGE`], and soon nothing outside.
+pub(super) fn log_radius_prior(distance: f64) -> f64 {
+    let [least, most] = RADIUS_RANGE;
+    if distance > most {
+        -0.5 * ((distance / most).ln() / 0.2).powi(2)
+    } else if distance < least {
+        -0.5 * ((least - distance) / (0.5 * least)).powi(2)
+    } else {
+        0.0
     }
-    let distance = distance.max(RADIUS_RANGE[0]);
-    -distance.ln() - 2.0 * (distance + LINK_RADIUS).ln()
 }

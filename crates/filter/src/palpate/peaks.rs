@@ -1,182 +1,206 @@
-//! Peaks of the evidence: found by scanning, climbed by Newton's method, each with its Laplace approximation.
+//! Peaks of the evidence: climbed by Newton's method, each with its Laplace approximation.
 
-use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+use nalgebra::{Matrix4, Vector4};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
+use super::chart::Chart;
 use super::evidence::Evidence;
-use super::memory::Keyframe;
-use super::noise::Noise;
-use super::obstacle::{LINK_RADIUS, Obstacle, RADIUS_RANGE, Touch, touch};
-use crate::step::Step;
+use super::history::History;
+use super::obstacle::{Core, Obstacle, Touch, log_radius_prior};
 
-/// Finite-difference steps along the chart's axes: m, m, and on the logarithm of the radius.
-const STEPS: [f64; 3] = [1e-3, 1e-3, 0.1];
-/// Prior precision that the chart's axes have anyhow: a decimetre, a decimetre, a factor of five.
-const PRIOR_PRECISION: [f64; 3] = [100.0, 100.0, 0.4];
+/// Finite-difference steps along the chart's axes: m, m, on the logarithm of the radius, rad.
+const STEPS: [f64; 4] = [1e-3, 1e-3, 0.1, 0.05];
+/// Precision that the chart's axes have anyhow: a decimetre, a decimetre, a factor of five, a radian.
+const PRIOR_PRECISION: [f64; 4] = [100.0, 100.0, 0.4, 1.0];
 /// Longest Newton step along the chart's axes.
-const REACH: [f64; 3] = [0.02, 0.02, 1.0];
+const REACH: [f64; 4] = [0.02, 0.02, 1.0, 0.5];
+/// How much wider than Laplace's approximation the draws are, and which share of them, so that tails are reached.
+const WIDTHS: [(f64, f64); 2] = [(0.7, 1.1), (0.3, 3.0)];
 
-/// A local maximum of the evidence and the Gaussian that approximates the posterior around it, in a chart: two
-/// lengths along the surface, m, and the logarithm of the radius.
+/// A local maximum of the evidence and the Gaussian that approximates the posterior around it.
 #[derive(Clone, Debug)]
 pub(super) struct Peak {
     pub(super) obstacle: Obstacle,
     pub(super) evidence: Evidence,
-    chart: Chart,
-    covariance: Matrix3<f64>,
-    precision: Matrix3<f64>,
+    pub(super) touch: Touch,
     /// Log of the posterior mass by Laplace's approximation.
     pub(super) log_mass: f64,
-    pub(super) touch: Touch,
-}
-
-/// Coordinates (a, b, ρ) of obstacle centres around one: c = p + α n̂ + (a u + b v)(1 + d/R), α = d exp ρ. In these the
-/// prior is uniform.
-#[derive(Clone, Copy, Debug)]
-struct Chart {
-    root_from_link: nalgebra::Isometry3<f64>,
-    foot: Point3<f64>,
-    axes: Rotation3<f64>,
-    distance: f64,
-    spread: f64,
-}
-
-impl Chart {
-    fn new(root_from_link: nalgebra::Isometry3<f64>, touch: &Touch) -> Self {
-        let normal = touch.normal.into_inner();
-        let side = if normal.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
-        let u = normal.cross(&side).normalize();
-        let v = normal.cross(&u);
-        let distance = touch.distance.max(RADIUS_RANGE[0]);
-        Self {
-            root_from_link,
-            foot: touch.point,
-            axes: Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[u, v, normal])),
-            distance,
-            spread: 1.0 + distance / LINK_RADIUS,
-        }
-    }
-
-    fn centre(&self, x: &Vector3<f64>) -> Point3<f64> {
-        let local = Vector3::new(x[0] * self.spread, x[1] * self.spread, self.distance * x[2].exp());
-        self.root_from_link * (self.foot + self.axes * local)
-    }
-
-    /// Coordinates of a centre, and the log of the chart's volume element there. None below the tangent plane.
-    fn coordinates(&self, centre: &Point3<f64>) -> Option<(Vector3<f64>, f64)> {
-        let local = self.axes.inverse() * (self.root_from_link.inverse_transform_point(centre) - self.foot);
-        if local.z <= 0.0 {
-            return None;
-        }
-        let x = Vector3::new(local.x / self.spread, local.y / self.spread, (local.z / self.distance).ln());
-        Some((x, 2.0 * self.spread.ln() + local.z.ln()))
-    }
+    chart: Chart,
+    precision: Matrix4<f64>,
+    /// Lower Cholesky factor of the covariance.
+    root: Matrix4<f64>,
 }
 
 impl Peak {
     /// Prepares the climb from a first guess.
-    pub(super) fn new(mut obstacle: Obstacle, step: &Step, keyframes: &[Keyframe], noise: &Noise) -> Self {
-        let evidence = obstacle.evidence(step.robot, step.skin, keyframes, noise);
-        let link = obstacle.link as usize;
-        let view = &keyframes[keyframes.len() - 1].links[link];
-        let centre = view.link_from_root * obstacle.centre;
-        let touch = touch(step.skin.surface(link), &centre, Some(obstacle.triangle));
+    pub(super) fn new(mut obstacle: Obstacle, history: &History) -> Self {
+        let evidence = history.evidence(&mut obstacle);
+        let touch = history.newest_touch(&obstacle);
+        let link_from_root = history.newest_link_from_root(obstacle.link);
         Self {
+            chart: Chart::new(link_from_root, &obstacle.core, &touch),
+            log_mass: evidence.log,
+            precision: Matrix4::identity(),
+            root: Matrix4::identity(),
             obstacle,
             evidence,
-            chart: Chart::new(view.link_from_root.inverse(), &touch),
-            covariance: Matrix3::identity(),
-            precision: Matrix3::identity(),
-            log_mass: evidence.log,
             touch,
         }
     }
 
+    /// Climbs by at most `most` Newton steps.
+    pub(super) fn climb(&mut self, history: &History, most: usize) {
+        for _ in 0..most {
+            if self.step(history) < 0.1 {
+                break;
+            }
+        }
+    }
+
     /// One step of Newton's method with all derivatives by finite differences. Tells how far it moved, in steps.
-    pub(super) fn climb(&mut self, step: &Step, keyframes: &[Keyframe], noise: &Noise) -> f64 {
-        *self = Self::new(self.obstacle, step, keyframes, noise);
-        let value = |x: &Vector3<f64>| self.at(x, step, keyframes, noise).1.log;
-        let here = self.evidence.log;
+    fn step(&mut self, history: &History) -> f64 {
+        *self = Self::new(self.obstacle, history);
+        let dimension = self.chart.dimension();
+        let value = |x: &Vector4<f64>| self.at(x, history).2;
+        let here = value(&Vector4::zeros());
         let offset = |axis: usize, sign: f64| {
-            let mut x = Vector3::zeros();
+            let mut x = Vector4::zeros();
             x[axis] = sign * STEPS[axis];
             x
         };
-        let ahead = [0, 1, 2].map(|axis| value(&offset(axis, 1.0)));
-        let behind = [0, 1, 2].map(|axis| value(&offset(axis, -1.0)));
-        let mut gradient = Vector3::zeros();
-        let mut precision = Matrix3::zeros();
-        for i in 0..3 {
-            gradient[i] = (ahead[i] - behind[i]) / (2.0 * STEPS[i]);
-            precision[(i, i)] = -(ahead[i] - 2.0 * here + behind[i]) / (STEPS[i] * STEPS[i]);
+        let mut gradient = Vector4::zeros();
+        let mut hessian = Matrix4::zeros();
+        let mut ahead = [0.0; 4];
+        for i in 0..dimension {
+            ahead[i] = value(&offset(i, 1.0));
+            let behind = value(&offset(i, -1.0));
+            gradient[i] = (ahead[i] - behind) / (2.0 * STEPS[i]);
+            hessian[(i, i)] = (ahead[i] - 2.0 * here + behind) / (STEPS[i] * STEPS[i]);
             for j in 0..i {
                 let both = value(&(offset(i, 1.0) + offset(j, 1.0)));
-                let mixed = -(both - ahead[i] - ahead[j] + here) / (STEPS[i] * STEPS[j]);
-                precision[(i, j)] = mixed;
-                precision[(j, i)] = mixed;
+                let mixed = (both - ahead[i] - ahead[j] + here) / (STEPS[i] * STEPS[j]);
+                hessian[(i, j)] = mixed;
+                hessian[(j, i)] = mixed;
             }
         }
-        let eigen = precision.symmetric_eigen();
-        let floor = Vector3::from(PRIOR_PRECISION);
-        // Away from a maximum the curvature may be negative: its size still is a scale.
-        let lifted = eigen.eigenvalues.map(f64::abs);
-        self.precision = eigen.eigenvectors * Matrix3::from_diagonal(&lifted) * eigen.eigenvectors.transpose()
-            + Matrix3::from_diagonal(&floor);
-        self.covariance = self.precision.try_inverse().unwrap_or_else(Matrix3::identity);
-        self.log_mass = self.evidence.log - 0.5 * self.precision.determinant().max(1e-300).ln();
-        let newton = self.covariance * gradient;
-        let scale = (0..3).map(|i| (newton[i].abs() / REACH[i]).max(1.0)).fold(1.0, f64::max);
-        self.search_along(newton / scale, step, keyframes, noise)
+        let covariance = self.approximate(&hessian, here);
+        let newton = covariance * gradient;
+        let scale = (0..4).map(|i| newton[i].abs() / REACH[i]).fold(1.0, f64::max);
+        self.search_along(newton / scale, here, history)
     }
 
-    /// Goes as much of `way` as improves the evidence.
-    fn search_along(&mut self, way: Vector3<f64>, step: &Step, keyframes: &[Keyframe], noise: &Noise) -> f64 {
+    /// Laplace's approximation from the log posterior's second derivatives. Away from a maximum the curvature may
+    /// have either sign: its size still is a scale. Returns the covariance.
+    fn approximate(&mut self, hessian: &Matrix4<f64>, log_posterior: f64) -> Matrix4<f64> {
+        let eigen = hessian.symmetric_eigen();
+        let lifted = Matrix4::from_diagonal(&eigen.eigenvalues.map(f64::abs));
+        self.precision = eigen.eigenvectors * lifted * eigen.eigenvectors.transpose();
+        for axis in 0..4 {
+            self.precision[(axis, axis)] += PRIOR_PRECISION[axis];
+        }
+        let covariance = self.precision.try_inverse().unwrap_or_else(Matrix4::identity);
+        self.root = covariance.cholesky().map_or_else(Matrix4::zeros, |factor| factor.l());
+        // Per dimension √2π from the Gaussian, and a bar's direction has the prior density 1/π.
+        let constant = match self.chart.dimension() {
+            4 => 0.5 * std::f64::consts::TAU.ln() - std::f64::consts::PI.ln(),
+            _ => 0.5 * PRIOR_PRECISION[3].ln(),
+        };
+        self.log_mass = log_posterior + constant - 0.5 * self.log_determinant();
+        covariance
+    }
+
+    fn log_determinant(&self) -> f64 {
+        self.precision.determinant().max(f64::MIN_POSITIVE).ln()
+    }
+
+    /// Goes as much of `way` as improves the posterior.
+    fn search_along(&mut self, way: Vector4<f64>, here: f64, history: &History) -> f64 {
         for share in [1.0, 0.4, 0.1] {
-            let (obstacle, evidence) = self.at(&(way * share), step, keyframes, noise);
-            if evidence.log > self.evidence.log {
+            let (obstacle, evidence, value) = self.at(&(way * share), history);
+            if value > here {
                 self.obstacle = obstacle;
                 self.evidence = evidence;
-                return (0..3).map(|i| (way[i] * share / STEPS[i]).abs()).fold(0.0, f64::max);
+                self.log_mass += value - here;
+                return (0..4).map(|i| (way[i] * share / STEPS[i]).abs()).fold(0.0, f64::max);
             }
         }
         0.0
     }
 
-    fn at(&self, x: &Vector3<f64>, step: &Step, keyframes: &[Keyframe], noise: &Noise) -> (Obstacle, Evidence) {
-        let mut obstacle = Obstacle { centre: self.chart.centre(x), ..self.obstacle };
-        let radius = self.chart.distance * x[2].exp();
-        if !(RADIUS_RANGE[0]..=RADIUS_RANGE[1]).contains(&radius) {
-            return (obstacle, Evidence { log: f64::NEG_INFINITY, ..Evidence::default() });
-        }
-        let evidence = obstacle.evidence(step.robot, step.skin, keyframes, noise);
-        (obstacle, evidence)
+    /// Obstacle, evidence and log posterior in the chart's measure at x.
+    fn at(&self, x: &Vector4<f64>, history: &History) -> (Obstacle, Evidence, f64) {
+        let surface = history.skin.surface(self.obstacle.link as usize);
+        let mut obstacle = Obstacle { core: self.chart.core(surface, x), ..self.obstacle };
+        let evidence = history.evidence(&mut obstacle);
+        let value = evidence.log + log_radius_prior(self.chart.radius(x));
+        (obstacle, evidence, value)
     }
 
-    /// A centre drawn from the peak's Gaussian.
-    pub(super) fn draw(&self, random: &mut impl Rng) -> Option<Point3<f64>> {
-        let gauss = Vector3::from_fn(|_, _| random.sample::<f64, _>(StandardNormal));
-        let root = self.covariance.cholesky()?.l();
-        // Wider than Laplace's approximation, so that tails are reached.
-        let widen = if random.random::<f64>() < 0.3 { 3.0 } else { 1.1 };
-        Some(self.chart.centre(&(root * gauss * widen)))
+    /// A core drawn from the peak's Gaussian, somewhat widened.
+    pub(super) fn draw(&self, history: &History, random: &mut impl Rng) -> Core {
+        let widen = if random.random::<f64>() < WIDTHS[0].0 { WIDTHS[0].1 } else { WIDTHS[1].1 };
+        self.displaced(&Vector4::zeros(), widen, history, random)
     }
 
-    /// Log density of [`Peak::draw`] at a centre.
-    pub(super) fn log_density(&self, centre: &Point3<f64>) -> f64 {
-        let Some((x, log_volume)) = self.chart.coordinates(centre) else {
+    /// A core some standard deviations, in all directions of the peak's Gaussian, from the one at x.
+    pub(super) fn displaced(
+        &self,
+        x: &Vector4<f64>,
+        deviations: f64,
+        history: &History,
+        random: &mut impl Rng,
+    ) -> Core {
+        let gauss = Vector4::from_fn(|_, _| random.sample::<f64, _>(StandardNormal));
+        let surface = history.skin.surface(self.obstacle.link as usize);
+        self.chart.core(surface, &(x + self.root * gauss * deviations))
+    }
+
+    /// Coordinates of a core in the peak's chart, with the log of the volume element.
+    pub(super) fn coordinates(&self, core: &Core) -> Option<(Vector4<f64>, f64)> {
+        self.chart.coordinates(core)
+    }
+
+    /// Log density, in space, of [`Peak::draw`] at a core.
+    pub(super) fn log_density(&self, core: &Core) -> f64 {
+        let Some((x, log_volume)) = self.chart.coordinates(core) else {
             return f64::NEG_INFINITY;
         };
         let squared = x.dot(&(self.precision * x));
-        let half_log_det = 0.5 * self.precision.determinant().max(1e-300).ln();
-        let part = |share: f64, widen: f64| share * (-0.5 * squared / (widen * widen)).exp() / (widen * widen * widen);
-        (part(0.7, 1.1) + part(0.3, 3.0)).max(1e-300).ln() + half_log_det - log_volume
+        let dimension = self.chart.dimension() as i32;
+        let part = |(share, width): (f64, f64)| share * (-0.5 * squared / (width * width)).exp() / width.powi(dimension);
+        let mixture: f64 = WIDTHS.into_iter().map(part).sum();
+        mixture.max(f64::MIN_POSITIVE).ln() + 0.5 * self.log_determinant()
+            - 0.5 * f64::from(dimension) * std::f64::consts::TAU.ln()
+            - log_volume
     }
 
     /// Whether another peak is the same one.
     pub(super) fn is_same(&self, other: &Self) -> bool {
+        let radius = |peak: &Self| peak.touch.distance.max(1e-3).ln();
         self.obstacle.link == other.obstacle.link
+            && self.obstacle.core.axis.is_some() == other.obstacle.core.axis.is_some()
             && (self.touch.point - other.touch.point).norm() < 4e-3
-            && (self.touch.distance.max(1e-3) / other.touch.distance.max(1e-3)).ln().abs() < 0.5
+            && (radius(self) - radius(other)).abs() < 0.5
     }
+
+    /// Whether this peak is of the same link and kind as an obstacle.
+    pub(super) fn is_akin(&self, obstacle: &Obstacle) -> bool {
+        self.obstacle.link == obstacle.link && self.obstacle.core.axis.is_some() == obstacle.core.axis.is_some()
+    }
+}
+
+/// Most peaks kept.
+const MOST: usize = 12;
+
+/// Leaves the peaks with the largest mass, each once, the largest first.
+pub(super) fn keep_best(peaks: &mut Vec<Peak>) {
+    peaks.sort_by(|a, b| b.log_mass.total_cmp(&a.log_mass));
+    let mut kept: Vec<Peak> = Vec::with_capacity(MOST);
+    for peak in peaks.drain(..) {
+        if kept.len() < MOST && peak.log_mass.is_finite() && !kept.iter().any(|other| other.is_same(&peak)) {
+            kept.push(peak);
+        }
+    }
+    *peaks = kept;
 }
