@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from support import PARTICLES, SAMPLES, URDF, PalpateNode, Peer, new_domain, palpate
+from support import PARTICLES, URDF, PalpateNode, Peer, new_domain, palpate
 
 
 @pytest.fixture
@@ -53,9 +53,9 @@ def bag(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def parameters(tmp_path_factory):
-    """Few particles, for speed, and a buffer in which nothing is lost however slow the machine is."""
+    """Few particles, for speed, and a wait so long that nothing is lost, however slow the machine is."""
     path = tmp_path_factory.mktemp("parameters") / "parameters.yaml"
-    values = {"filter.particles": PARTICLES, "input.buffer": 2 * SAMPLES, "seed": 5}
+    values = {"filter.particles": PARTICLES, "input.max_wait_secs": 3600, "seed": 5}
     lines = [f"    {name}: {value}" for name, value in values.items()]
     path.write_text("\n".join(["/**:", "  ros__parameters:", *lines]))
     return path

@@ -75,6 +75,14 @@ pub struct TimedSample {
     pub epoch: u64,
 }
 
+impl TimedSample {
+    /// Whether this sample is older than `newest` by more than `age_ns`, or of another epoch.
+    pub fn is_older(&self, newest: &Self, age_ns: i64) -> bool {
+        let age = newest.sample.stamp_ns.saturating_sub(self.sample.stamp_ns);
+        self.epoch != newest.epoch || age > age_ns
+    }
+}
+
 /// One of the two topics.
 #[derive(Debug)]
 struct Source {
@@ -225,8 +233,8 @@ impl Source {
     }
 }
 
-/// Saturates, for settings are finite but may be large.
-fn nanoseconds(secs: f64) -> i64 {
+/// Nanoseconds of a setting. Saturates.
+pub fn nanoseconds(secs: f64) -> i64 {
     (secs * 1e9) as i64
 }
 
@@ -347,6 +355,8 @@ mod tests {
         let before = give(&mut input, 100_000 * MS, &both, &[1.0, 2.0]);
         let after = give(&mut input, MS, &both, &[1.0, 2.0]);
         assert_eq!((before[0].epoch, after[0].epoch), (0, 1));
+        assert!(before[0].is_older(&after[0], i64::MAX));
+        assert!(!after[0].is_older(&after[0], 0));
         assert_eq!(input.counts().stamp_not_after, 0);
     }
 }

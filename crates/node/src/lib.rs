@@ -5,6 +5,8 @@ mod joint_input;
 mod newest;
 mod throttle;
 
-pub use joint_input::{JointInput, JointMessage, MessageCounts, MessageError, TimedSample};
+pub use joint_input::{
+    JointInput, JointMessage, MessageCounts, MessageError, TimedSample, nanoseconds,
+};
 pub use newest::Newest;
 pub use throttle::Throttle;

@@ -36,8 +36,15 @@ impl<T> Newest<T> {
 
     /// Puts an entry in, in place of the oldest where there is no room.
     pub fn push(&self, entry: T) {
+        self.push_over(entry, |_, _| false);
+    }
+
+    /// Puts an entry in, in place of the oldest where there is no room, and of the oldest ones that are `stale` beside
+    /// it.
+    pub fn push_over(&self, entry: T, stale: impl Fn(&T, &T) -> bool) {
         let mut state = self.lock();
-        if state.waiting.len() == self.capacity {
+        let is_stale = |oldest: &T| stale(oldest, &entry);
+        while state.waiting.len() == self.capacity || state.waiting.front().is_some_and(is_stale) {
             state.waiting.pop_front();
             state.lost += 1;
         }
@@ -111,6 +118,16 @@ mod tests {
             [Some(7), Some(8), Some(9)]
         );
         assert_eq!(buffer.try_pop(), None);
+    }
+
+    #[test]
+    fn stale_entries_give_way_to_a_new_one() {
+        let buffer = Newest::new(10);
+        for entry in [1, 2, 5, 3] {
+            buffer.push_over(entry, |oldest, newest| oldest + 2 < *newest);
+        }
+        assert_eq!(buffer.lost(), 2);
+        assert_eq!([buffer.pop(), buffer.pop()], [Some(5), Some(3)]);
     }
 
     #[test]

@@ -7,9 +7,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use futures::{FutureExt, Stream, StreamExt};
-use palpate_filter::{Filter, Settings};
+use palpate_filter::{Filter, InputSettings, Settings};
 use palpate_model::Robot;
-use palpate_node::{JointInput, JointMessage, MessageError, Newest, Throttle, TimedSample};
+use palpate_node::{
+    JointInput, JointMessage, MessageError, Newest, Throttle, TimedSample, nanoseconds,
+};
 use r2r::QosProfile;
 use r2r::sensor_msgs::msg::JointState;
 
@@ -20,6 +22,8 @@ use crate::{messages, stopped};
 
 /// Messages that the middleware keeps for a reader that is late.
 const DEPTH: usize = 100;
+/// Samples that wait for the filter at most, however young they are.
+const MOST_WAITING: usize = 10_000;
 
 /// Works until asked to stop.
 pub fn run(
@@ -30,7 +34,7 @@ pub fn run(
 ) -> anyhow::Result<()> {
     let robot = Arc::new(robot);
     let filter = Filter::new(&robot, &settings.filter, settings.seed)?;
-    let samples = Arc::new(Newest::new(settings.input.buffer));
+    let samples = Arc::new(Newest::new(MOST_WAITING));
     let easel = Arc::new(Easel::new());
     let progress = Arc::new(Mutex::new(Progress::default()));
 
@@ -53,11 +57,7 @@ pub fn run(
     })?;
 
     let mut diagnostics = Diagnostics::new(node, &robot, settings, progress)?;
-    let mut reader = Reader::new(
-        node,
-        JointInput::new(robot, &settings.input),
-        Arc::clone(&samples),
-    )?;
+    let mut reader = Reader::new(node, robot, &settings.input, Arc::clone(&samples))?;
     while !stopped(stop) && !estimating.is_finished() && !drawing.is_finished() {
         node.spin_once(Duration::from_millis(20));
         reader.drain();
@@ -108,21 +108,24 @@ struct Reader {
     torques: Box<dyn Stream<Item = JointState> + Unpin>,
     input: JointInput,
     samples: Arc<Newest<TimedSample>>,
+    max_wait_ns: i64,
     complaints: Throttle,
 }
 
 impl Reader {
     fn new(
         node: &mut r2r::Node,
-        input: JointInput,
+        robot: Arc<Robot>,
+        settings: &InputSettings,
         samples: Arc<Newest<TimedSample>>,
     ) -> r2r::Result<Self> {
         let qos = QosProfile::sensor_data().keep_last(DEPTH);
         Ok(Self {
             positions: Box::new(node.subscribe("joint_states", qos.clone())?),
             torques: Box::new(node.subscribe("external_torque", qos)?),
-            input,
+            input: JointInput::new(robot, settings),
             samples,
+            max_wait_ns: nanoseconds(settings.max_wait_secs),
             complaints: Throttle::new(Duration::from_secs(5)),
         })
     }
@@ -148,7 +151,10 @@ impl Reader {
             tracing::warn!("message refused (and {more} before): {refusal}");
         }
         while let Some(sample) = self.input.next_sample() {
-            self.samples.push(sample);
+            let max_wait_ns = self.max_wait_ns;
+            let stale =
+                |oldest: &TimedSample, newest: &TimedSample| oldest.is_older(newest, max_wait_ns);
+            self.samples.push_over(sample, stale);
         }
     }
 }
