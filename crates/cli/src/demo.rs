@@ -298,14 +298,15 @@ impl Told {
 }
 
 fn millimetres(metres: f64) -> String {
-    if metres.is_finite() {
-        format!("{:.1} mm", 1e3 * metres)
-    } else {
-        "no estimate".to_owned()
+    match 1e3 * metres {
+        small if small < 1.0 => format!("{small:.2} mm"),
+        large if large.is_finite() => format!("{large:.1} mm"),
+        _ => "no estimate".to_owned(),
     }
 }
 
-fn instant(filter: &Filter, truth: &Truth) -> Instant {
+/// How well the contact is known now.
+pub fn instant(filter: &Filter, truth: &Truth) -> Instant {
     let estimate = filter.estimate();
     let best = estimate.best();
     let pair = best.zip(truth.contact.as_ref());
@@ -318,7 +319,8 @@ fn instant(filter: &Filter, truth: &Truth) -> Instant {
     }
 }
 
-fn moment(robot: &Robot, filter: &Filter, truth: &Truth, secs: f64) -> Moment {
+/// All that the filter knows now, with the truth.
+pub fn moment(robot: &Robot, filter: &Filter, truth: &Truth, secs: f64) -> Moment {
     let (kinematics, estimate) = (filter.kinematics(), filter.estimate());
     let scene = Scene::new(robot, kinematics, estimate, filter.particles());
     Moment {

@@ -2,6 +2,7 @@
 
 mod demo;
 mod estimates_csv;
+mod evaluate;
 mod inspect;
 mod last_second;
 mod picture;
@@ -43,6 +44,7 @@ enum Command {
     Replay(replay::Replay),
     Simulate(simulate::Simulate),
     Inspect(inspect::Inspect),
+    Evaluate(evaluate::Evaluate),
 }
 
 /// Options that contradict the data or each other, found after parsing.
@@ -66,6 +68,7 @@ fn main() -> ExitCode {
         Command::Replay(replay) => replay.run(),
         Command::Simulate(simulate) => simulate.run(),
         Command::Inspect(inspect) => inspect.run(),
+        Command::Evaluate(evaluate) => evaluate.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -10,15 +10,22 @@ use super::{Instant, Moment};
 /// Particles in one chart, at most.
 const MOST_DOTS: usize = 1500;
 
-/// Draws a chart a moment, side by side from `at`, in `size`, px.
-pub fn forces(svg: &mut Svg, moments: &[Moment], at: [f64; 2], size: [f64; 2]) {
-    const GAP: f64 = 16.0;
-    let width = (size[0] + GAP) / moments.len().max(1) as f64 - GAP;
+/// Left edge and width of `count` columns in `width` from `left` on, px.
+pub fn columns(count: usize, left: f64, width: f64) -> Vec<(f64, f64)> {
+    const GAP: f64 = 26.0;
+    let each = (width + GAP) / count.max(1) as f64 - GAP;
+    (0..count)
+        .map(|index| (left + index as f64 * (each + GAP), each))
+        .collect()
+}
+
+/// Draws a chart a moment in the given columns, px.
+pub fn forces(svg: &mut Svg, moments: &[Moment], columns: &[(f64, f64)], top: f64, height: f64) {
     let (x, y) = (distance_scale(moments), force_scale(moments));
-    for (index, moment) in moments.iter().enumerate() {
+    for (index, (moment, &(left, width))) in moments.iter().zip(columns).enumerate() {
         let axes = Axes {
-            at: [at[0] + index as f64 * (width + GAP), at[1]],
-            size: [width, size[1]],
+            at: [left, top],
+            size: [width, height],
             x,
             y,
         };
@@ -33,13 +40,6 @@ pub fn forces(svg: &mut Svg, moments: &[Moment], at: [f64; 2], size: [f64; 2]) {
 
 fn draw_moment(svg: &mut Svg, moment: &Moment, axes: &Axes) {
     let [left, top] = axes.at;
-    let title = format!("t = {:.2} s", moment.secs);
-    svg.text(
-        [left + 0.5 * axes.size[0], top - 8.0],
-        Anchor::Middle,
-        "label",
-        &title,
-    );
     let stride = moment.cloud.len().div_ceil(MOST_DOTS).max(1);
     let dots = moment.cloud.iter().step_by(stride).filter_map(|point| {
         let (x, y) = (point.point_in_root.coords.norm(), point.force);
@@ -103,27 +103,29 @@ pub fn errors(svg: &mut Svg, history: &[Instant], at: [f64; 2], size: [f64; 2]) 
             logarithmic: true,
         },
     };
-    axes.draw(svg, "time, s", Some("position, mm"));
+    axes.draw(svg, "time, s", Some("error, mm"));
     let place =
         |instant: &Instant, metres: Option<f64>| Some(axes.place(instant.secs, 1e3 * metres?));
     svg.polyline(history.iter().map(|i| place(i, i.std)), "std");
     svg.polyline(history.iter().map(|i| place(i, i.error)), "error");
     let wrong = |i: &Instant| i.error.filter(|_| !i.right_link);
     svg.polyline(history.iter().map(|i| place(i, wrong(i))), "wrong");
-    errors_legend(svg, [at[0] + size[0] - 12.0, at[1] + 20.0]);
+    errors_legend(svg, [at[0] + size[0], at[1] - 12.0]);
     strip(svg, history, &axes);
 }
 
-fn errors_legend(svg: &mut Svg, [right, top]: [f64; 2]) {
+/// Names the lines in one row that ends at `right`, px.
+fn errors_legend(svg: &mut Svg, [mut right, y]: [f64; 2]) {
     let lines = [
+        ("std", "its standard deviation"),
+        ("wrong", "… wrong link"),
         ("error", "error of the estimate"),
-        ("wrong", "… while on a wrong link"),
-        ("std", "its own standard deviation"),
     ];
-    for (row, (class, name)) in lines.into_iter().enumerate() {
-        let y = top + 17.0 * row as f64;
-        svg.line([right - 26.0, y - 4.0], [right, y - 4.0], class);
-        svg.text([right - 33.0, y], Anchor::End, "small", name);
+    for (class, name) in lines {
+        svg.text([right, y], Anchor::End, "small", name);
+        right -= 6.2 * name.chars().count() as f64 + 8.0;
+        svg.line([right - 22.0, y - 4.0], [right, y - 4.0], class);
+        right -= 34.0;
     }
 }
 
@@ -143,7 +145,7 @@ fn strip(svg: &mut Svg, history: &[Instant], axes: &Axes) {
             (to - from).max(1.0)
         ));
     }
-    let mut x = axes.at[0];
+    let mut x = axes.at[0] + 170.0;
     let all = [
         ContactStatus::NoContact,
         ContactStatus::Ambiguous,
@@ -153,13 +155,13 @@ fn strip(svg: &mut Svg, history: &[Instant], axes: &Axes) {
         .into_iter()
         .zip(["no contact", "contact, ambiguous", "located"])
     {
-        let y = axes.at[1] + axes.size[1] + 46.0;
+        let y = axes.at[1] + axes.size[1] + 52.0;
         let class = status.word();
         svg.add(format_args!(
             r#"<rect class="{class}" x="{x:.1}" y="{:.1}" width="14" height="9"/>"#,
             y - 8.5
         ));
         svg.text([x + 19.0, y], Anchor::Start, "small", name);
-        x += 40.0 + 6.2 * name.len() as f64;
+        x += 42.0 + 6.8 * name.len() as f64;
     }
 }

@@ -118,38 +118,41 @@ fn corner_normals(mesh: &TriangleMesh) -> Vec<[Vector3<f64>; 3]> {
         .collect()
 }
 
-/// Half of the side of the piece of a plane that is drawn, m.
-const PLANE_PIECE: f64 = 0.25;
-
 /// The obstacle's triangles, of a plane those around `contact_in_root`.
 pub fn of_obstacle(obstacle: &Obstacle, contact_in_root: &Point3<f64>) -> Vec<Facet> {
-    let pose = &obstacle.root_from_obstacle;
     if let ObstacleKind::Plane {} = obstacle.kind {
-        let middle = pose.inverse_transform_point(contact_in_root);
-        let corner = |x: f64, y: f64| pose * Point3::new(middle.x + x, middle.y + y, 0.0);
-        let p = PLANE_PIECE;
-        let square = [corner(-p, -p), corner(p, -p), corner(p, p), corner(-p, p)];
-        let normals = [pose * Vector3::z(); 4];
-        return quad(square, normals).into();
+        return plane_piece(obstacle, contact_in_root);
     }
-    let vertex = |direction: &Vector3<f64>| pose * support(&obstacle.kind, direction);
-    let directions = sphere_directions();
+    let rows: Vec<Vec<_>> = (sphere_directions().iter())
+        .map(|row| {
+            row.iter()
+                .map(|direction| skin(obstacle, direction))
+                .collect()
+        })
+        .collect();
     let mut facets = Vec::new();
-    for rows in directions.windows(2) {
+    for pair in rows.windows(2) {
         for column in 0..COLUMNS {
             let next = (column + 1) % COLUMNS;
-            let all = [
-                rows[0][column],
-                rows[1][column],
-                rows[1][next],
-                rows[0][next],
-            ];
-            let turned = all.map(|direction| pose * direction);
-            facets.extend(quad(all.map(|direction| vertex(&direction)), turned));
+            facets.extend(quad([
+                pair[0][column],
+                pair[1][column],
+                pair[1][next],
+                pair[0][next],
+            ]));
         }
+    }
+    // The ends, which a box has as faces.
+    for column in 1..COLUMNS - 1 {
+        let (top, bottom) = (&rows[0], &rows[ROWS - 1]);
+        facets.push(triangle([top[0], top[column], top[column + 1]]));
+        facets.push(triangle([bottom[0], bottom[column + 1], bottom[column]]));
     }
     facets
 }
+
+/// A corner of a triangle and the normal there, in the root frame.
+type Corner = (Point3<f64>, Vector3<f64>);
 
 const ROWS: usize = 24;
 const COLUMNS: usize = 48;
@@ -167,9 +170,9 @@ fn sphere_directions() -> Vec<Vec<Vector3<f64>>> {
     (0..ROWS).map(row).collect()
 }
 
-/// The outermost point of a rounded convex body in a direction, in its frame.
-fn support(kind: &ObstacleKind, direction: &Vector3<f64>) -> Point3<f64> {
-    let core = match *kind {
+/// The outermost point of a rounded convex body in a direction of its frame.
+fn skin(obstacle: &Obstacle, direction: &Vector3<f64>) -> Corner {
+    let core = match obstacle.kind {
         ObstacleKind::Sphere { .. } | ObstacleKind::Plane {} => Vector3::zeros(),
         ObstacleKind::Cylinder { half_length, .. } => Vector3::new(0.0, 0.0, half_length),
         ObstacleKind::Box {
@@ -178,14 +181,115 @@ fn support(kind: &ObstacleKind, direction: &Vector3<f64>) -> Point3<f64> {
         } => Vector3::from(half_extents).add_scalar(-fillet),
     };
     let outermost = core.zip_map(direction, |half, d| half.copysign(d));
-    Point3::from(outermost + direction * kind.rounding().unwrap_or(0.0))
+    let rounding = obstacle.kind.rounding().unwrap_or(0.0);
+    let pose = &obstacle.root_from_obstacle;
+    (
+        pose * Point3::from(outermost + direction * rounding),
+        pose * direction,
+    )
+}
+
+/// A square piece of a plane about a point, with both its sides.
+fn plane_piece(plane: &Obstacle, about_in_root: &Point3<f64>) -> Vec<Facet> {
+    const HALF: f64 = 0.2;
+    let pose = &plane.root_from_obstacle;
+    let middle = pose.inverse_transform_point(about_in_root);
+    let corner = |x: f64, y: f64| {
+        let point = Point3::new(middle.x + x * HALF, middle.y + y * HALF, 0.0);
+        (pose * point, pose * Vector3::z())
+    };
+    let [a, b, c, d] = [
+        corner(-1.0, -1.0),
+        corner(1.0, -1.0),
+        corner(1.0, 1.0),
+        corner(-1.0, 1.0),
+    ];
+    let below = |(point, normal): Corner| (point, -normal);
+    (quad([a, b, c, d]).into_iter())
+        .chain(quad([d, c, b, a].map(below)))
+        .collect()
 }
 
 /// Two triangles, counter-clockwise as the corners are.
-fn quad(corners: [Point3<f64>; 4], normals: [Vector3<f64>; 4]) -> [Facet; 2] {
-    [[0, 1, 2], [0, 2, 3]].map(|pick| Facet {
-        corners: pick.map(|i: usize| corners[i]),
-        normals: pick.map(|i: usize| normals[i]),
+fn quad([a, b, c, d]: [Corner; 4]) -> [Facet; 2] {
+    [triangle([a, b, c]), triangle([a, c, d])]
+}
+
+fn triangle(corners: [Corner; 3]) -> Facet {
+    Facet {
+        corners: corners.map(|(point, _)| point),
+        normals: corners.map(|(_, normal)| normal),
         material: Material::Obstacle,
-    })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn area_and_volume(kind: ObstacleKind) -> (f64, f64) {
+        let root_from_obstacle = Isometry3::translation(0.3, 0.2, 0.1);
+        let obstacle = Obstacle {
+            kind,
+            root_from_obstacle,
+        };
+        let facets = of_obstacle(&obstacle, &Point3::origin());
+        let doubled = |f: &Facet| {
+            let [a, b, c] = &f.corners;
+            (b - a).cross(&(c - a))
+        };
+        let area: f64 = facets.iter().map(|f| 0.5 * doubled(f).norm()).sum();
+        let volume: f64 = (facets.iter())
+            .map(|f| f.corners[0].coords.dot(&doubled(f)) / 6.0)
+            .sum();
+        (area, volume)
+    }
+
+    fn assert_near((area, volume): (f64, f64), expected_area: f64, expected_volume: f64) {
+        assert!(
+            (area / expected_area - 1.0).abs() < 0.02,
+            "{area} {expected_area}"
+        );
+        assert!(
+            (volume / expected_volume - 1.0).abs() < 0.02,
+            "{volume} {expected_volume}"
+        );
+    }
+
+    #[test]
+    fn obstacles_are_closed_and_face_outwards() {
+        let r: f64 = 0.05;
+        let (ball_area, ball) = (4.0 * PI * r * r, 4.0 / 3.0 * PI * r.powi(3));
+        assert_near(
+            area_and_volume(ObstacleKind::Sphere { radius: r }),
+            ball_area,
+            ball,
+        );
+        let pole = ObstacleKind::Cylinder {
+            radius: r,
+            half_length: 0.2,
+            axis: None,
+        };
+        assert_near(
+            area_and_volume(pole),
+            ball_area + TAU * r * 0.4,
+            ball + PI * r * r * 0.4,
+        );
+        let cube = ObstacleKind::Box {
+            half_extents: [0.1, 0.2, 0.3],
+            fillet: 1e-4,
+        };
+        assert_near(
+            area_and_volume(cube),
+            8.0 * (0.02 + 0.03 + 0.06),
+            8.0 * 0.006,
+        );
+    }
+
+    #[test]
+    fn a_piece_of_a_plane_has_two_sides() {
+        let (area, volume) = area_and_volume(ObstacleKind::Plane {});
+        assert!((area - 0.32).abs() < 1e-12, "{area}");
+        assert!(volume.abs() < 1e-12, "{volume}");
+    }
 }

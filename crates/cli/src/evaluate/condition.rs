@@ -1,0 +1,148 @@
+//! What touches the arm, and what its sensors and the filter's mesh get wrong.
+
+use nalgebra::Vector3;
+use palpate_model::Robot;
+use palpate_sim::{ObstacleKind, Scenario, coarsen};
+
+/// A variation of the one basic scenario: a sphere, white noise of 10 % of each joint's rms torque, and the filter's
+/// own mesh as the true one.
+pub struct Condition {
+    /// Name in options, tables and files.
+    pub name: &'static str,
+    /// In words.
+    pub title: &'static str,
+    /// What it changes in the basic scenario.
+    change: fn(&mut Scenario),
+    /// The filter's mesh is coarsened to triangles of this size, m.
+    pub filter_mesh_edge: Option<f64>,
+}
+
+impl Condition {
+    const fn new(name: &'static str, title: &'static str, change: fn(&mut Scenario)) -> Self {
+        Self {
+            name,
+            title,
+            change,
+            filter_mesh_edge: None,
+        }
+    }
+
+    /// The scenario of a trial.
+    pub fn scenario(&self, link: &str, seed: u64, secs: f64) -> Scenario {
+        let mut scenario = Scenario {
+            seed,
+            noise_fraction: 0.1,
+            duration_secs: secs,
+            refine_levels: 0,
+            ..Scenario::new(link)
+        };
+        (self.change)(&mut scenario);
+        scenario
+    }
+
+    /// The robot as the filter knows it.
+    pub fn known_robot(&self, robot: &Robot) -> Robot {
+        let mut known = robot.clone();
+        if let Some(edge) = self.filter_mesh_edge {
+            for mesh in known
+                .links
+                .iter_mut()
+                .filter_map(|link| link.mesh.as_mut())
+            {
+                *mesh = coarsen(mesh, edge);
+            }
+        }
+        known
+    }
+}
+
+/// Every condition.
+pub static CONDITIONS: [Condition; 12] = [
+    Condition::new("sphere", "sphere of 30 mm radius, 10 % noise", |_| {}),
+    Condition::new("noise0", "sphere, no noise", |s| s.noise_fraction = 0.0),
+    Condition::new("noise5", "sphere, 5 % noise", |s| s.noise_fraction = 0.05),
+    Condition::new(
+        "edge",
+        "edge of a cube of 100 mm, rounded by 5 mm, 10 % noise",
+        |s| {
+            s.obstacle = ObstacleKind::Box {
+                half_extents: [0.05; 3],
+                fillet: 0.005,
+            };
+        },
+    ),
+    Condition::new(
+        "bias",
+        "sphere, 10 % noise, a constant bias on every joint, drawn with σ = 0.2 Nm",
+        |s| s.bias_sigma = 0.2,
+    ),
+    Condition::new(
+        "friction",
+        "sphere, 10 % noise, Coulomb friction 0.3",
+        |s| s.friction = 0.3,
+    ),
+    Condition::new(
+        "floor",
+        "sphere, 10 % noise and 0.1 Nm of white noise on every joint",
+        |s| s.noise_floor = 0.1,
+    ),
+    Condition::new(
+        "cylinder",
+        "pole of 30 mm radius and 400 mm length, 10 % noise",
+        |s| {
+            s.obstacle = ObstacleKind::Cylinder {
+                radius: 0.03,
+                half_length: 0.2,
+                axis: None,
+            };
+        },
+    ),
+    Condition::new("plane", "plane, 10 % noise", |s| {
+        s.obstacle = ObstacleKind::Plane {};
+    }),
+    Condition {
+        filter_mesh_edge: Some(0.015),
+        ..Condition::new(
+            "mesh15",
+            "sphere, 10 % noise, the filter's mesh coarsened to triangles of 15 mm",
+            |_| {},
+        )
+    },
+    Condition::new(
+        "finer",
+        "sphere, 10 % noise, the true mesh rounder than the filter's, with four times its triangles",
+        |s| s.refine_levels = 1,
+    ),
+    Condition::new(
+        "drift",
+        "sphere, 10 % noise, the obstacle drifts by 5 mm/s in a drawn direction",
+        |s| s.drift = (direction(s.seed) * 0.005).into(),
+    ),
+];
+
+/// The condition of this name; the names in [experiments](super::experiment) all exist, which a test checks.
+pub fn named(name: &str) -> Option<&'static Condition> {
+    CONDITIONS.iter().find(|condition| condition.name == name)
+}
+
+/// A direction that follows from the seed, uniform over the sphere.
+fn direction(seed: u64) -> Vector3<f64> {
+    let share = |salt| super::seed::share(&[seed, salt]);
+    let (height, angle) = (2.0 * share(1) - 1.0, std::f64::consts::TAU * share(2));
+    let level = (1.0 - height * height).max(0.0).sqrt();
+    Vector3::new(level * angle.cos(), level * angle.sin(), height)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_have_unit_length_and_cancel_out() {
+        let all: Vec<_> = (0..2000).map(direction).collect();
+        assert!(all.iter().all(|d| (d.norm() - 1.0).abs() < 1e-12));
+        let mean = all.iter().sum::<Vector3<f64>>() / 2000.0;
+        // Standard deviation of each coordinate's mean: 1 / sqrt(3 · 2000) = 0.013.
+        assert!(mean.amax() < 0.06, "{mean}");
+    }
+}
