@@ -8,7 +8,9 @@ use crate::palpate::PalpateFilter;
 use crate::paper::PaperFilter;
 use crate::skin::Skin;
 use crate::step::Step;
-use crate::{Admitted, ContactEstimate, ContactStatus, Method, ParameterError, Parameters, Particle};
+use crate::{
+    Admitted, ContactEstimate, ContactStatus, Method, ParameterError, Parameters, Particle,
+};
 
 /// The method chosen, with all that it knows of the present contact.
 enum Estimator {
@@ -20,8 +22,15 @@ impl Estimator {
     fn new(robot: &Robot, parameters: &Parameters, seed: u64) -> Self {
         let count = parameters.particles;
         match parameters.method {
-            Method::Paper => Self::Paper(PaperFilter::new(parameters.paper.clone(), count, robot.links.len(), seed)),
-            Method::Palpate => Self::Palpate(PalpateFilter::new(robot, parameters.palpate.clone(), seed)),
+            Method::Paper => Self::Paper(PaperFilter::new(
+                parameters.paper.clone(),
+                count,
+                robot.links.len(),
+                seed,
+            )),
+            Method::Palpate => {
+                Self::Palpate(PalpateFilter::new(robot, parameters.palpate.clone(), seed))
+            }
         }
     }
 

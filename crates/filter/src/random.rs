@@ -13,6 +13,7 @@ pub(crate) enum Purpose {
     Propagate = 2,
     Resample = 3,
     Fresh = 4,
+    Hop = 5,
 }
 
 /// The random stream of one chunk of particles at one step.

@@ -52,10 +52,14 @@ impl Skin {
             .expect("particles live on touchable links only")
     }
 
+    /// Area of all touchable links, m².
+    pub(crate) fn area(&self) -> f64 {
+        self.cumulative_area.last().copied().unwrap_or(0.0)
+    }
+
     /// A link and a point on it, uniform over the area of all touchable links, for four uniform numbers in \[0, 1).
     pub(crate) fn sample(&self, uniform: [f64; 4]) -> (usize, SurfacePoint) {
-        let total = self.cumulative_area.last().copied().unwrap_or(0.0);
-        let wanted = uniform[0] * total;
+        let wanted = uniform[0] * self.area();
         let index = self.cumulative_area.partition_point(|&area| area <= wanted);
         let link = self.links[index.min(self.links.len() - 1)];
         (

@@ -23,7 +23,11 @@ impl Chart {
     /// The chart around a core that touches its link, in the configuration of `link_from_root`.
     pub(super) fn new(link_from_root: &Isometry3<f64>, core_in_root: &Core, touch: &Touch) -> Self {
         let normal = touch.normal.into_inner();
-        let side = if normal.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+        let side = if normal.x.abs() < 0.7 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
         let u = normal.cross(&side).normalize();
         let v = normal.cross(&u);
         let distance = touch.distance.max(RADIUS_RANGE[0]);
@@ -73,7 +77,12 @@ impl Chart {
             (Some(own), Some(other)) => self.turn(&own, &other),
             _ => return None,
         };
-        let x = Vector4::new(local.x / self.spread, local.y / self.spread, (local.z / self.distance).ln(), turn);
+        let x = Vector4::new(
+            local.x / self.spread,
+            local.y / self.spread,
+            (local.z / self.distance).ln(),
+            turn,
+        );
         Some((x, 2.0 * self.spread.ln() + local.z.ln()))
     }
 
@@ -86,7 +95,11 @@ impl Chart {
 }
 
 /// `axis` laid into the plane normal to `normal` and turned about it.
-pub(super) fn tangential(axis: &Unit<Vector3<f64>>, normal: &Unit<Vector3<f64>>, turn: f64) -> Unit<Vector3<f64>> {
+pub(super) fn tangential(
+    axis: &Unit<Vector3<f64>>,
+    normal: &Unit<Vector3<f64>>,
+    turn: f64,
+) -> Unit<Vector3<f64>> {
     let flat = axis.into_inner() - normal.into_inner() * axis.dot(normal);
     let flat = Unit::try_new(flat, 1e-9).unwrap_or(*axis);
     Rotation3::from_axis_angle(normal, turn) * flat

@@ -11,7 +11,13 @@ use super::noise::Noise;
 pub(crate) const MOST_JOINTS: usize = 12;
 
 /// Grid of friction coefficients μ and their prior probabilities.
-const FRICTION: [(f64, f64); 5] = [(0.0, 0.4), (0.1, 0.15), (0.2, 0.15), (0.3, 0.15), (0.45, 0.15)];
+const FRICTION: [(f64, f64); 5] = [
+    (0.0, 0.4),
+    (0.1, 0.15),
+    (0.2, 0.15),
+    (0.3, 0.15),
+    (0.45, 0.15),
+];
 /// Prior standard deviation of the force F₀, N, and of the stiffness K, N/m.
 const FORCE_SCALE: f64 = 60.0;
 const STIFFNESS_SCALE: f64 = 2e4;
@@ -71,7 +77,10 @@ impl Sums {
 
     /// Integrates force, stiffness, friction and biases out. `path` are the joints that the sums belong to.
     pub(super) fn evidence(&self, noise: &Noise, path: &[usize]) -> Evidence {
-        let mut best = Evidence { log: f64::NEG_INFINITY, ..Evidence::default() };
+        let mut best = Evidence {
+            log: f64::NEG_INFINITY,
+            ..Evidence::default()
+        };
         let mut total = 0.0;
         for (friction, prior) in FRICTION {
             for scale in 0..noise.bias_scales() {
@@ -90,7 +99,8 @@ impl Sums {
     }
 
     fn evidence_at(&self, mu: f64, noise: &Noise, scale: usize, path: &[usize]) -> Evidence {
-        let gram = |power: usize| self.nn[power] + mu * (2.0 * self.nt[power] + mu * self.tt[power]);
+        let gram =
+            |power: usize| self.nn[power] + mu * (2.0 * self.nt[power] + mu * self.tt[power]);
         let mut a = [gram(0), gram(1), gram(2)];
         let mut r = [self.ny[0] + mu * self.ty[0], self.ny[1] + mu * self.ty[1]];
         for (index, &joint) in path.iter().enumerate() {
@@ -159,7 +169,13 @@ fn log_normal_cdf(x: f64) -> f64 {
     // Abramowitz and Stegun 26.2.17, on the side where it is small.
     let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
     let series = t
-        * (0.319_381_530 + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
+        * (0.319_381_530
+            + t * (-0.356_563_782
+                + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
     let tail = 0.398_942_280_4 * (-0.5 * x * x).exp() * series;
-    if x > 0.0 { (1.0 - tail).ln() } else { tail.ln() }
+    if x > 0.0 {
+        (1.0 - tail).ln()
+    } else {
+        tail.ln()
+    }
 }

@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use palpate_model::Robot;
 
+use super::chart::tangential;
 use super::evidence::Evidence;
 use super::memory::Keyframe;
 use super::noise::Noise;
-use super::chart::tangential;
 use super::obstacle::{Core, Obstacle, Touch};
 use crate::skin::Skin;
 
@@ -36,6 +36,11 @@ impl History<'_> {
         obstacle.evidence(self.robot, self.skin, self.keyframes, self.noise)
     }
 
+    /// Log of the prior density, in space, of an obstacle that touches at `distance`, m.
+    pub(super) fn log_prior(&self, obstacle: &Obstacle, distance: f64) -> f64 {
+        obstacle.log_prior(distance, self.skin.area())
+    }
+
     /// Where an obstacle touches at the newest keyframe.
     pub(super) fn newest_touch(&self, obstacle: &Obstacle) -> Touch {
         obstacle.touch(self.skin, self.newest_link_from_root(obstacle.link))
@@ -52,12 +57,20 @@ impl History<'_> {
         radius: f64,
         turn: Option<f64>,
     ) -> Obstacle {
-        let side = if normal.x.abs() < 0.7 { Vector3::x_axis() } else { Vector3::y_axis() };
+        let side = if normal.x.abs() < 0.7 {
+            Vector3::x_axis()
+        } else {
+            Vector3::y_axis()
+        };
         let core = Core {
             centre: point + normal.into_inner() * radius,
             axis: turn.map(|turn| tangential(&side, normal, turn)),
         };
         let root_from_link = self.newest_link_from_root(link as u16).inverse();
-        Obstacle { link: link as u16, triangle, core: core.moved(&root_from_link) }
+        Obstacle {
+            link: link as u16,
+            triangle,
+            core: core.moved(&root_from_link),
+        }
     }
 }

@@ -109,10 +109,20 @@ impl Memory {
     }
 
     /// Takes a sample in. Tells whether that completed a keyframe, which is then the last of `keyframes`.
-    pub(super) fn push(&mut self, robot: &Robot, stamp_ns: i64, position: &[f64], torque: &[f64]) -> bool {
+    pub(super) fn push(
+        &mut self,
+        robot: &Robot,
+        stamp_ns: i64,
+        position: &[f64],
+        torque: &[f64],
+    ) -> bool {
         let filling = &mut self.filling;
         if filling.samples == 0.0 {
-            filling.first_ns = if self.committed > 0 { filling.last_ns } else { stamp_ns };
+            filling.first_ns = if self.committed > 0 {
+                filling.last_ns
+            } else {
+                stamp_ns
+            };
             if self.committed == 0 {
                 filling.last_position = position.to_vec();
             }
@@ -149,7 +159,11 @@ impl Memory {
     fn commit(&mut self, robot: &Robot) {
         let filling = &mut self.filling;
         let span = ((filling.last_ns - filling.first_ns) as f64 * 1e-9).max(self.period_secs);
-        let mean = |sums: &[f64]| sums.iter().map(|sum| sum / filling.samples).collect::<Vec<_>>();
+        let mean = |sums: &[f64]| {
+            sums.iter()
+                .map(|sum| sum / filling.samples)
+                .collect::<Vec<_>>()
+        };
         let velocity = (filling.last_position.iter().zip(&filling.first_position))
             .map(|(last, first)| (last - first) / span)
             .collect();

@@ -40,6 +40,10 @@ const CHUNK: usize = 32;
 /// Draws for each particle at the start.
 const FIRST_DRAWS: usize = 8;
 
+/// Climbs from new places at each keyframe, from the best peaks first, and the steps of each.
+const HOPS: usize = 6;
+const HOP_CLIMB: usize = 3;
+
 /// One particle: an obstacle and what the history says of it.
 #[derive(Clone, Copy, Debug)]
 struct Hypothesis {
@@ -88,7 +92,10 @@ impl PalpateFilter {
     /// One step: remember; at each completed keyframe calibrate, reweigh, resample, look for peaks, move.
     pub(crate) fn step(&mut self, step: &Step, stamp_ns: i64) {
         self.noise.learn(step.torque);
-        if !self.memory.push(step.robot, stamp_ns, step.position, step.torque) {
+        if !self
+            .memory
+            .push(step.robot, stamp_ns, step.position, step.torque)
+        {
             return;
         }
         self.keyframes += 1;
@@ -109,11 +116,17 @@ impl PalpateFilter {
     /// Learns from the best hypothesis' residuals how much larger they are than the noise model says.
     fn calibrate(&mut self, step: &Step) {
         let peak = self.peaks.iter().map(|peak| (peak.obstacle, peak.evidence));
-        let particle = self.particles.iter().map(|particle| (particle.obstacle, particle.evidence));
-        let best = peak.chain(particle).max_by(|a, b| a.1.log.total_cmp(&b.1.log));
+        let particle = self
+            .particles
+            .iter()
+            .map(|particle| (particle.obstacle, particle.evidence));
+        let best = peak
+            .chain(particle)
+            .max_by(|a, b| a.1.log.total_cmp(&b.1.log));
         if let Some((obstacle, evidence)) = best {
             let keyframes = &self.memory.keyframes;
-            self.noise.calibrate(&obstacle, &evidence, step.robot, step.skin, keyframes);
+            self.noise
+                .calibrate(&obstacle, &evidence, step.robot, step.skin, keyframes);
         }
     }
 
@@ -133,36 +146,72 @@ impl PalpateFilter {
     /// Weighs every particle by what the newest keyframe changed in its evidence.
     fn reweigh(&mut self, step: &Step) {
         let history = history(step, &self.memory, &self.noise);
-        self.particles.par_iter_mut().with_min_len(CHUNK).for_each(|particle| {
-            let evidence = history.evidence(&mut particle.obstacle);
-            particle.log_weight += evidence.log - particle.evidence.log;
-            particle.log_prior = particle.obstacle.log_prior(evidence.reference);
-            particle.evidence = evidence;
-        });
+        self.particles
+            .par_iter_mut()
+            .with_min_len(CHUNK)
+            .for_each(|particle| {
+                let evidence = history.evidence(&mut particle.obstacle);
+                particle.log_weight += evidence.log - particle.evidence.log;
+                particle.log_prior = history.log_prior(&particle.obstacle, evidence.reference);
+                particle.evidence = evidence;
+            });
     }
 
     fn resample(&mut self, step: &Step) {
         let count = self.parameters.hypotheses;
-        normalise(self.particles.iter().map(|particle| particle.log_weight), &mut self.weights);
-        if self.particles.len() == count && effective_sample_size(&self.weights) > 0.5 * count as f64 {
+        normalise(
+            self.particles.iter().map(|particle| particle.log_weight),
+            &mut self.weights,
+        );
+        if self.particles.len() == count
+            && effective_sample_size(&self.weights) > 0.5 * count as f64
+        {
             return;
         }
         let mut random = stream(self.seed, step.number, 0, Purpose::Resample);
         let mut chosen = Vec::new();
         systematic(&self.weights, count, random.random(), &mut chosen);
         self.particles = (chosen.iter())
-            .map(|&parent| Hypothesis { log_weight: 0.0, ..self.particles[parent as usize] })
+            .map(|&parent| Hypothesis {
+                log_weight: 0.0,
+                ..self.particles[parent as usize]
+            })
             .collect();
     }
 
     /// Keeps the peaks on top of the evidence, and now and then looks for others.
     fn seek_peaks(&mut self, step: &Step) {
         let history = history(step, &self.memory, &self.noise);
-        self.peaks.par_iter_mut().for_each(|peak| peak.climb(&history, 1));
+        self.peaks
+            .par_iter_mut()
+            .for_each(|peak| peak.climb(&history, 1));
+        self.peaks.extend(self.hop(step, &history));
         if scan::is_due(self.keyframes) {
             self.peaks.extend(scan::peaks(&history));
         }
         peaks::keep_best(&mut self.peaks);
+    }
+
+    /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks, and from some particles.
+    fn hop(&self, step: &Step, history: &History) -> Vec<Peak> {
+        let starts = |index: usize| {
+            let mut random = stream(self.seed, step.number, index, Purpose::Hop);
+            match self.peaks.get(index).filter(|_| index < HOPS - 2) {
+                Some(peak) => Obstacle {
+                    core: peak.draw(history, &mut random),
+                    ..peak.obstacle
+                },
+                None => self.particles[random.random_range(0..self.particles.len())].obstacle,
+            }
+        };
+        (0..HOPS)
+            .into_par_iter()
+            .map(|index| {
+                let mut peak = Peak::new(starts(index), history);
+                peak.climb(history, HOP_CLIMB);
+                peak
+            })
+            .collect()
     }
 
     fn mutate(&mut self, step: &Step, round: usize) {
@@ -170,35 +219,56 @@ impl PalpateFilter {
         let others = self.particles.clone();
         let proposals = Proposals::new(history, &others, &self.peaks);
         let (seed, chunks) = (self.seed, others.len().div_ceil(CHUNK));
-        self.particles.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, particles)| {
-            let mut random = stream(seed, step.number, chunk + round * chunks, Purpose::Propagate);
-            for particle in particles {
-                proposals.mutate(particle, &mut random);
-            }
-        });
+        self.particles
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .for_each(|(chunk, particles)| {
+                let mut random = stream(
+                    seed,
+                    step.number,
+                    chunk + round * chunks,
+                    Purpose::Propagate,
+                );
+                for particle in particles {
+                    proposals.mutate(particle, &mut random);
+                }
+            });
     }
 
     /// Writes the particles, with their weights, as the outside sees them at this sample.
     pub(crate) fn show(&mut self, step: &Step, cloud: &mut Vec<Particle>) {
-        normalise(self.particles.iter().map(|particle| particle.log_weight), &mut self.weights);
-        cloud.extend(self.particles.iter().zip(&self.weights).map(|(particle, &weight)| {
-            let link = particle.obstacle.link as usize;
-            let link_from_root = step.now.root_from_link(link).inverse();
-            let touch = particle.obstacle.touch(step.skin, &link_from_root);
-            Particle {
-                link,
-                point_in_link: touch.point,
-                normal_in_link: touch.normal,
-                force: particle.evidence.force_at(touch.distance),
-                stiffness: particle.evidence.stiffness.max(0.0),
-                weight,
-            }
-        }));
+        normalise(
+            self.particles.iter().map(|particle| particle.log_weight),
+            &mut self.weights,
+        );
+        cloud.extend(
+            self.particles
+                .iter()
+                .zip(&self.weights)
+                .map(|(particle, &weight)| {
+                    let link = particle.obstacle.link as usize;
+                    let link_from_root = step.now.root_from_link(link).inverse();
+                    let touch = particle.obstacle.touch(step.skin, &link_from_root);
+                    Particle {
+                        link,
+                        point_in_link: touch.point,
+                        normal_in_link: touch.normal,
+                        force: particle.evidence.force_at(touch.distance),
+                        stiffness: particle.evidence.stiffness.max(0.0),
+                        weight,
+                    }
+                }),
+        );
     }
 }
 
 fn history<'a>(step: &Step<'a>, memory: &'a Memory, noise: &'a Noise) -> History<'a> {
-    History { robot: step.robot, skin: step.skin, keyframes: &memory.keyframes, noise }
+    History {
+        robot: step.robot,
+        skin: step.skin,
+        keyframes: &memory.keyframes,
+        noise,
+    }
 }
 
 /// A ball or bar anywhere on the robot.
@@ -209,7 +279,13 @@ fn draw(history: &History, random: &mut impl Rng) -> Hypothesis {
     let normal = history.skin.surface(link).normal(place.triangle);
     let turn = std::f64::consts::PI * random.random::<f64>();
     let bar = random.random::<bool>().then_some(turn);
-    let mut obstacle = history.obstacle_on(link, place.triangle, &place.point, &normal, radius, bar);
+    let mut obstacle =
+        history.obstacle_on(link, place.triangle, &place.point, &normal, radius, bar);
     let evidence = history.evidence(&mut obstacle);
-    Hypothesis { obstacle, evidence, log_prior: obstacle.log_prior(radius), log_weight: evidence.log }
+    Hypothesis {
+        obstacle,
+        evidence,
+        log_prior: history.log_prior(&obstacle, radius),
+        log_weight: evidence.log,
+    }
 }

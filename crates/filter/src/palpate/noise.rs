@@ -19,6 +19,49 @@ const FLOOR_SECS: f64 = 0.2;
 const LEAST_RESIDUALS: f64 = 6.0;
 const PRIOR_RESIDUALS: f64 = 8.0;
 
+/// Weighted sums of one joint's residuals, in the order of time.
+#[derive(Clone, Copy, Debug, Default)]
+struct ResidualSums {
+    count: f64,
+    weight: f64,
+    first: f64,
+    second: f64,
+    /// Product of neighbours, with the geometric mean of their weights.
+    neighbours: f64,
+    last: Option<(f64, f64)>,
+}
+
+impl ResidualSums {
+    fn add(&mut self, residual: f64, weight: f64) {
+        self.count += 1.0;
+        self.weight += weight;
+        self.first += weight * residual;
+        self.second += weight * residual * residual;
+        if let Some((last, last_weight)) = self.last {
+            self.neighbours += (weight * last_weight).sqrt() * residual * last;
+        }
+        self.last = Some((residual, weight));
+    }
+
+    /// Mean square of the normalised residuals about their mean, which is the bias's business.
+    fn variance_factor(&self, inflation: f64) -> f64 {
+        let squares = (self.second - self.first * self.first / self.weight) * inflation;
+        (squares + PRIOR_RESIDUALS) / (self.count - 1.0 + PRIOR_RESIDUALS)
+    }
+
+    /// How many residuals tell the same, (1 + ρ) / (1 − ρ), with ρ the correlation of neighbours (Bayley and
+    /// Hammersley 1946).
+    fn repetition(&self) -> f64 {
+        let mean_part = self.first * self.first / self.weight;
+        let square = (self.second - mean_part).max(f64::MIN_POSITIVE);
+        // Shrunk, as few residuals show little of their correlation.
+        let rho =
+            (self.neighbours - mean_part) / square * self.count / (self.count + PRIOR_RESIDUALS);
+        let rho = rho.clamp(0.0, 0.9);
+        (1.0 + rho) / (1.0 - rho)
+    }
+}
+
 /// The effect of a bias of one scale on one joint's sums.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bias {
@@ -106,22 +149,21 @@ impl Noise {
         skin: &Skin,
         keyframes: &[Keyframe],
     ) {
-        let mut sums = vec![[0.0; 4]; self.white.len()];
-        obstacle.residuals(evidence, robot, skin, keyframes, self, |joint, residual, weight| {
-            let sum = &mut sums[joint];
-            sum[0] += 1.0;
-            sum[1] += weight;
-            sum[2] += weight * residual;
-            sum[3] += weight * residual * residual;
-        });
-        for (inflation, [count, weight, first, second]) in self.inflation.iter_mut().zip(sums) {
-            if count < LEAST_RESIDUALS {
-                continue;
+        let mut sums = vec![ResidualSums::default(); self.white.len()];
+        obstacle.residuals(
+            evidence,
+            robot,
+            skin,
+            keyframes,
+            self,
+            |joint, residual, weight| {
+                sums[joint].add(residual, weight);
+            },
+        );
+        for (inflation, sums) in self.inflation.iter_mut().zip(sums) {
+            if sums.count >= LEAST_RESIDUALS {
+                *inflation = (sums.variance_factor(*inflation) * sums.repetition()).clamp(1.0, 1e4);
             }
-            // The mean is the bias's business.
-            let squares = (second - first * first / weight) * *inflation;
-            let factor = (squares + PRIOR_RESIDUALS) / (count - 1.0 + PRIOR_RESIDUALS);
-            *inflation = factor.clamp(1.0, 1e4);
         }
     }
 
@@ -140,7 +182,10 @@ impl Noise {
             for (scale, sigma) in BIAS_SCALES.into_iter().enumerate() {
                 let variance = sigma * sigma;
                 let gain = 1.0 / (weight + 1.0 / variance);
-                self.bias[scale][joint] = Bias { gain, mean: gain * first };
+                self.bias[scale][joint] = Bias {
+                    gain,
+                    mean: gain * first,
+                };
                 self.base[scale] +=
                     0.5 * (log - second + gain * first * first - (1.0 + variance * weight).ln());
             }

@@ -9,7 +9,7 @@ use super::noise::Noise;
 use crate::skin::Skin;
 
 /// Speed at which friction has half its strength, m/s: below it the contact rather sticks.
-const STICKING_SPEED: f64 = 5e-4;
+const STICKING_SPEED: f64 = 2e-4;
 /// Half the length of a bar, m.
 const BAR_HALF_LENGTH: f64 = 0.3;
 /// How exactly the contact along a bar is found, m; it costs a projection an iteration.
@@ -105,7 +105,13 @@ fn touch_ball(surface: &Surface, centre: &Point3<f64>, start: u32) -> Touch {
         true => Unit::new_unchecked(away * (side / distance)),
         false => face,
     };
-    Touch { point: nearest.point, triangle: nearest.triangle, normal, distance: side * distance, along: 0.0 }
+    Touch {
+        point: nearest.point,
+        triangle: nearest.triangle,
+        normal,
+        distance: side * distance,
+        along: 0.0,
+    }
 }
 
 impl LinkView {
@@ -122,30 +128,54 @@ impl LinkView {
 impl Obstacle {
     /// Where it touches, in the configuration that `link_from_root` belongs to.
     pub(super) fn touch(&self, skin: &Skin, link_from_root: &Isometry3<f64>) -> Touch {
-        touch(skin.surface(self.link as usize), &self.core.moved(link_from_root), self.triangle, 0.0)
+        touch(
+            skin.surface(self.link as usize),
+            &self.core.moved(link_from_root),
+            self.triangle,
+            0.0,
+        )
     }
 
     /// The evidence of the whole history for this obstacle. Puts triangle and centre where the newest keyframe has
     /// the contact.
-    pub(super) fn evidence(&mut self, robot: &Robot, skin: &Skin, keyframes: &[Keyframe], noise: &Noise) -> Evidence {
+    pub(super) fn evidence(
+        &mut self,
+        robot: &Robot,
+        skin: &Skin,
+        keyframes: &[Keyframe],
+        noise: &Noise,
+    ) -> Evidence {
         let link = self.link as usize;
         let path = &robot.links[link].path;
         let mut sums = Sums::default();
         let mut newest: Option<Touch> = None;
         self.follow(skin, keyframes, |_, keyframe, touch| {
             let e = newest.get_or_insert(touch).distance - touch.distance;
-            sums.add(e, joint_torques(&keyframe.links[link], keyframe, &touch, path, noise));
+            sums.add(
+                e,
+                joint_torques(&keyframe.links[link], keyframe, &touch, path, noise),
+            );
         });
-        let Some(newest) = newest else { return Evidence::default() };
+        let Some(newest) = newest else {
+            return Evidence::default();
+        };
         self.triangle = newest.triangle;
         if let Some(axis) = self.core.axis {
             self.core.centre += axis.into_inner() * newest.along;
         }
-        Evidence { reference: newest.distance, ..sums.evidence(noise, path) }
+        Evidence {
+            reference: newest.distance,
+            ..sums.evidence(noise, path)
+        }
     }
 
     /// Follows the contact through the keyframes, from the newest to the oldest.
-    fn follow<'a>(&self, skin: &Skin, keyframes: &'a [Keyframe], mut visit: impl FnMut(usize, &'a Keyframe, Touch)) {
+    fn follow<'a>(
+        &self,
+        skin: &Skin,
+        keyframes: &'a [Keyframe],
+        mut visit: impl FnMut(usize, &'a Keyframe, Touch),
+    ) {
         let link = self.link as usize;
         let (mut start, mut along) = (self.triangle, 0.0);
         for (index, keyframe) in keyframes.iter().enumerate().rev() {
@@ -190,28 +220,41 @@ fn joint_torques<'a>(
     let push_moment = touch.point.coords.cross(&push);
     let rub = view.friction_direction(touch);
     let rub_moment = touch.point.coords.cross(&rub);
-    view.screws.column_iter().zip(path).map(move |(screw, &joint)| {
-        let apply = |force: &Vector3<f64>, moment: &Vector3<f64>| {
-            screw[0] * force.x + screw[1] * force.y + screw[2] * force.z
-                + screw[3] * moment.x + screw[4] * moment.y + screw[5] * moment.z
-        };
-        JointTorque {
-            normal: apply(&push, &push_moment),
-            tangential: apply(&rub, &rub_moment),
-            measured: keyframe.torque[joint],
-            weight: noise.weight(keyframe, joint),
-        }
-    })
+    view.screws
+        .column_iter()
+        .zip(path)
+        .map(move |(screw, &joint)| {
+            let apply = |force: &Vector3<f64>, moment: &Vector3<f64>| {
+                screw[0] * force.x
+                    + screw[1] * force.y
+                    + screw[2] * force.z
+                    + screw[3] * moment.x
+                    + screw[4] * moment.y
+                    + screw[5] * moment.z
+            };
+            JointTorque {
+                normal: apply(&push, &push_moment),
+                tangential: apply(&rub, &rub_moment),
+                measured: keyframe.torque[joint],
+                weight: noise.weight(keyframe, joint),
+            }
+        })
 }
 
 impl Obstacle {
     /// Log of the prior density of an obstacle that touches at `distance` (m), in space: contact points uniform over
-    /// the surface and radii uniform in log space, on a link that is itself about [`LINK_RADIUS`] round; balls and
-    /// bars alike, the bars in any direction along the surface.
-    pub(super) fn log_prior(&self, distance: f64) -> f64 {
+    /// a skin of the given area (m²) and radii uniform in log space, on a link that is itself about [`LINK_RADIUS`]
+    /// round; balls and bars alike, the bars in any direction along the surface.
+    pub(super) fn log_prior(&self, distance: f64, area: f64) -> f64 {
         let radius = distance.max(RADIUS_RANGE[0]);
-        let direction = if self.core.axis.is_some() { -std::f64::consts::PI.ln() } else { 0.0 };
-        direction - radius.ln() - 2.0 * (radius + LINK_RADIUS).ln() + log_radius_prior(distance)
+        let direction = if self.core.axis.is_some() {
+            -std::f64::consts::PI.ln()
+        } else {
+            0.0
+        };
+        let normalisation = 2.0 * area * (RADIUS_RANGE[1] / RADIUS_RANGE[0]).ln();
+        direction - normalisation.ln() - radius.ln() - 2.0 * (1.0 + radius / LINK_RADIUS).ln()
+            + log_radius_prior(distance)
     }
 }
 

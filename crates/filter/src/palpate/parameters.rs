@@ -16,7 +16,10 @@ pub struct PalpateParameters {
 
 impl Default for PalpateParameters {
     fn default() -> Self {
-        Self { hypotheses: 500, rounds: 3 }
+        Self {
+            hypotheses: 500,
+            rounds: 3,
+        }
     }
 }
 
@@ -24,8 +27,18 @@ impl PalpateParameters {
     pub(crate) fn check(&self) -> Result<(), ParameterError> {
         let check = ParameterError::check;
         let count = self.hypotheses as f64;
-        check("filter.palpate.hypotheses", "50 … 100,000", count, (50.0..=1e5).contains(&count))?;
+        check(
+            "filter.palpate.hypotheses",
+            "50 … 100,000",
+            count,
+            (50.0..=1e5).contains(&count),
+        )?;
         let rounds = self.rounds as f64;
-        check("filter.palpate.rounds", "1 … 100", rounds, (1.0..=100.0).contains(&rounds))
+        check(
+            "filter.palpate.rounds",
+            "1 … 100",
+            rounds,
+            (1.0..=100.0).contains(&rounds),
+        )
     }
 }

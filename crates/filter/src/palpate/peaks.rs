@@ -86,7 +86,9 @@ impl Peak {
         }
         let covariance = self.approximate(&hessian, here);
         let newton = covariance * gradient;
-        let scale = (0..4).map(|i| newton[i].abs() / REACH[i]).fold(1.0, f64::max);
+        let scale = (0..4)
+            .map(|i| newton[i].abs() / REACH[i])
+            .fold(1.0, f64::max);
         self.search_along(newton / scale, here, history)
     }
 
@@ -99,8 +101,13 @@ impl Peak {
         for axis in 0..4 {
             self.precision[(axis, axis)] += PRIOR_PRECISION[axis];
         }
-        let covariance = self.precision.try_inverse().unwrap_or_else(Matrix4::identity);
-        self.root = covariance.cholesky().map_or_else(Matrix4::zeros, |factor| factor.l());
+        let covariance = self
+            .precision
+            .try_inverse()
+            .unwrap_or_else(Matrix4::identity);
+        self.root = covariance
+            .cholesky()
+            .map_or_else(Matrix4::zeros, |factor| factor.l());
         // Per dimension √2π from the Gaussian, and a bar's direction has the prior density 1/π.
         let constant = match self.chart.dimension() {
             4 => 0.5 * std::f64::consts::TAU.ln() - std::f64::consts::PI.ln(),
@@ -122,7 +129,9 @@ impl Peak {
                 self.obstacle = obstacle;
                 self.evidence = evidence;
                 self.log_mass += value - here;
-                return (0..4).map(|i| (way[i] * share / STEPS[i]).abs()).fold(0.0, f64::max);
+                return (0..4)
+                    .map(|i| (way[i] * share / STEPS[i]).abs())
+                    .fold(0.0, f64::max);
             }
         }
         0.0
@@ -131,7 +140,10 @@ impl Peak {
     /// Obstacle, evidence and log posterior in the chart's measure at x.
     fn at(&self, x: &Vector4<f64>, history: &History) -> (Obstacle, Evidence, f64) {
         let surface = history.skin.surface(self.obstacle.link as usize);
-        let mut obstacle = Obstacle { core: self.chart.core(surface, x), ..self.obstacle };
+        let mut obstacle = Obstacle {
+            core: self.chart.core(surface, x),
+            ..self.obstacle
+        };
         let evidence = history.evidence(&mut obstacle);
         let value = evidence.log + log_radius_prior(self.chart.radius(x));
         (obstacle, evidence, value)
@@ -139,7 +151,11 @@ impl Peak {
 
     /// A core drawn from the peak's Gaussian, somewhat widened.
     pub(super) fn draw(&self, history: &History, random: &mut impl Rng) -> Core {
-        let widen = if random.random::<f64>() < WIDTHS[0].0 { WIDTHS[0].1 } else { WIDTHS[1].1 };
+        let widen = if random.random::<f64>() < WIDTHS[0].0 {
+            WIDTHS[0].1
+        } else {
+            WIDTHS[1].1
+        };
         self.displaced(&Vector4::zeros(), widen, history, random)
     }
 
@@ -153,7 +169,8 @@ impl Peak {
     ) -> Core {
         let gauss = Vector4::from_fn(|_, _| random.sample::<f64, _>(StandardNormal));
         let surface = history.skin.surface(self.obstacle.link as usize);
-        self.chart.core(surface, &(x + self.root * gauss * deviations))
+        self.chart
+            .core(surface, &(x + self.root * gauss * deviations))
     }
 
     /// Coordinates of a core in the peak's chart, with the log of the volume element.
@@ -168,7 +185,9 @@ impl Peak {
         };
         let squared = x.dot(&(self.precision * x));
         let dimension = self.chart.dimension() as i32;
-        let part = |(share, width): (f64, f64)| share * (-0.5 * squared / (width * width)).exp() / width.powi(dimension);
+        let part = |(share, width): (f64, f64)| {
+            share * (-0.5 * squared / (width * width)).exp() / width.powi(dimension)
+        };
         let mixture: f64 = WIDTHS.into_iter().map(part).sum();
         mixture.max(f64::MIN_POSITIVE).ln() + 0.5 * self.log_determinant()
             - 0.5 * f64::from(dimension) * std::f64::consts::TAU.ln()
@@ -186,7 +205,8 @@ impl Peak {
 
     /// Whether this peak is of the same link and kind as an obstacle.
     pub(super) fn is_akin(&self, obstacle: &Obstacle) -> bool {
-        self.obstacle.link == obstacle.link && self.obstacle.core.axis.is_some() == obstacle.core.axis.is_some()
+        self.obstacle.link == obstacle.link
+            && self.obstacle.core.axis.is_some() == obstacle.core.axis.is_some()
     }
 }
 
@@ -198,7 +218,10 @@ pub(super) fn keep_best(peaks: &mut Vec<Peak>) {
     peaks.sort_by(|a, b| b.log_mass.total_cmp(&a.log_mass));
     let mut kept: Vec<Peak> = Vec::with_capacity(MOST);
     for peak in peaks.drain(..) {
-        if kept.len() < MOST && peak.log_mass.is_finite() && !kept.iter().any(|other| other.is_same(&peak)) {
+        if kept.len() < MOST
+            && peak.log_mass.is_finite()
+            && !kept.iter().any(|other| other.is_same(&peak))
+        {
             kept.push(peak);
         }
     }

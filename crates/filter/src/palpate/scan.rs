@@ -42,22 +42,34 @@ pub(super) fn is_due(keyframes: usize) -> bool {
 /// Peaks that the newest keyframe leads to: balls first, then bars where the best balls are.
 pub(super) fn peaks(history: &History) -> Vec<Peak> {
     let links = history.skin.links();
-    let candidates: Vec<Candidate> =
-        links.par_iter().flat_map_iter(|&link| candidates(history, link)).collect();
-    let mut balls: Vec<Peak> =
-        candidates.par_iter().map(|candidate| climb_ball(history, candidate)).collect();
+    let candidates: Vec<Candidate> = links
+        .par_iter()
+        .flat_map_iter(|&link| candidates(history, link))
+        .collect();
+    let mut balls: Vec<Peak> = candidates
+        .par_iter()
+        .map(|candidate| climb_ball(history, candidate))
+        .collect();
     super::peaks::keep_best(&mut balls);
-    let bars: Vec<Peak> = (balls.par_iter().take(BARS)).map(|ball| climb_bar(history, ball)).collect();
+    let bars: Vec<Peak> = (balls.par_iter().take(BARS))
+        .map(|ball| climb_bar(history, ball))
+        .collect();
     balls.extend(bars);
     balls
 }
 
 fn climb_ball(history: &History, candidate: &Candidate) -> Peak {
     let surface = history.skin.surface(candidate.link);
-    let (foot, normal) = (surface.centroid(candidate.triangle), surface.normal(candidate.triangle));
+    let (foot, normal) = (
+        surface.centroid(candidate.triangle),
+        surface.normal(candidate.triangle),
+    );
     let start = |radius: f64| {
         let triangle = candidate.triangle;
-        Peak::new(history.obstacle_on(candidate.link, triangle, &foot, &normal, radius, None), history)
+        Peak::new(
+            history.obstacle_on(candidate.link, triangle, &foot, &normal, radius, None),
+            history,
+        )
     };
     climb_best(history, RADII.map(start).into_iter())
 }
@@ -67,15 +79,30 @@ fn climb_bar(history: &History, ball: &Peak) -> Peak {
     let (touch, radius) = (&ball.touch, ball.touch.distance);
     let start = |direction: usize| {
         let turn = Some(std::f64::consts::PI * direction as f64 / DIRECTIONS as f64);
-        let bar = history.obstacle_on(link, touch.triangle, &touch.point, &touch.normal, radius, turn);
+        let bar = history.obstacle_on(
+            link,
+            touch.triangle,
+            &touch.point,
+            &touch.normal,
+            radius,
+            turn,
+        );
         Peak::new(bar, history)
     };
     climb_best(history, (0..DIRECTIONS).map(start))
 }
 
 fn climb_best(history: &History, starts: impl Iterator<Item = Peak>) -> Peak {
-    let better = |a: Peak, b: Peak| if b.evidence.log > a.evidence.log { b } else { a };
-    let mut peak = starts.reduce(better).expect("a climb has at least one start");
+    let better = |a: Peak, b: Peak| {
+        if b.evidence.log > a.evidence.log {
+            b
+        } else {
+            a
+        }
+    };
+    let mut peak = starts
+        .reduce(better)
+        .expect("a climb has at least one start");
     peak.climb(history, CLIMB);
     peak
 }
@@ -92,7 +119,11 @@ fn candidates(history: &History, link: usize) -> Vec<Candidate> {
         let slack = SLACK * SLACK + (SLACK_SHARE * torque).powi(2);
         1.0 / (1.0 / history.noise.weight(keyframe, joint) + slack)
     };
-    for (column, &joint) in view.screws.column_iter().zip(&history.robot.links[link].path) {
+    for (column, &joint) in view
+        .screws
+        .column_iter()
+        .zip(&history.robot.links[link].path)
+    {
         a += column * column.transpose() * weight(joint);
         g += column * (weight(joint) * keyframe.torque[joint]);
     }
@@ -111,11 +142,17 @@ fn candidates(history: &History, link: usize) -> Vec<Candidate> {
     let misfits: Vec<f64> = (0..surface.triangle_count() as u32).map(misfit).collect();
     let is_minimum = |&triangle: &u32| {
         let own = misfits[triangle as usize];
-        surface.neighbours(triangle).all(|other| own <= misfits[other as usize])
+        surface
+            .neighbours(triangle)
+            .all(|other| own <= misfits[other as usize])
     };
     let mut candidates: Vec<Candidate> = (0..misfits.len() as u32)
         .filter(is_minimum)
-        .map(|triangle| Candidate { link, triangle, misfit: misfits[triangle as usize] })
+        .map(|triangle| Candidate {
+            link,
+            triangle,
+            misfit: misfits[triangle as usize],
+        })
         .collect();
     candidates.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
     candidates.truncate(CANDIDATES);
