@@ -5,18 +5,19 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use comfy_table::Table;
-use palpate_filter::{Filter, Scene, Settings};
+use palpate_filter::{Filter, Settings};
 use palpate_model::{IIWA14_URDF, JointSample, LoadOptions, Robot, iiwa14};
-use palpate_sim::{ObstacleKind, Scenario, Trial, Truth};
+use palpate_sim::{ObstacleKind, Scenario, Trial};
 
-use crate::last_second::median;
-use crate::picture::{Instant, Moment, Picture};
+use crate::estimates_csv::EstimatesCsv;
+use crate::picture::Picture;
 use crate::recorder::Recorder;
 use crate::replay::set_threads;
 use crate::simulate::{START_NS, simulate_from_start};
-use crate::track::{Track, track};
-use crate::{Usage, estimates_csv, progress, table};
+use crate::told::{LINE_HEAD, Told, line};
+pub use crate::told::{instant, moment};
+use crate::track::track;
+use crate::{Usage, progress, table};
 
 /// Simulate a contact on an iiwa arm and find it from joint positions and torques alone
 ///
@@ -195,7 +196,8 @@ impl Demo {
 
     fn write(&self, robot: &Robot, trial: &Trial, told: &Told, settings: &Settings) -> Result<()> {
         if let Some(track) = &told.track {
-            estimates_csv::write(&self.out.join("estimates.csv"), robot, &track.estimates)?;
+            let csv = EstimatesCsv::create(&self.out.join("estimates.csv"))?;
+            csv.write(robot, &track.estimates)?;
         }
         let link = &robot.links[trial.link].name;
         let picture = Picture {
@@ -223,134 +225,4 @@ impl Demo {
 
 fn write_file(path: &Path, text: &str) -> Result<()> {
     fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// What the run told.
-#[derive(Default)]
-struct Told {
-    history: Vec<Instant>,
-    moments: Vec<Moment>,
-    track: Option<Track>,
-}
-
-impl Told {
-    /// The instants of the last second.
-    fn last_second(&self) -> impl Iterator<Item = &Instant> {
-        let end = self.history.last().map_or(0.0, |instant| instant.secs);
-        self.history
-            .iter()
-            .filter(move |instant| instant.secs >= end - 1.0)
-    }
-
-    /// Median error over the last second, m; infinite where there is no estimate.
-    fn error(&self) -> f64 {
-        median(self.last_second().map(|i| i.error.unwrap_or(f64::INFINITY)))
-    }
-
-    /// Time after which the error stays below `limit`, m; s.
-    fn settled_secs(&self, limit: f64) -> Option<f64> {
-        let good = |instant: &&Instant| instant.error.is_some_and(|error| error < limit);
-        self.history
-            .iter()
-            .rev()
-            .take_while(good)
-            .last()
-            .map(|instant| instant.secs)
-    }
-
-    fn summary(&self) -> String {
-        format!("Last second: {} from the truth.", millimetres(self.error()))
-    }
-
-    fn table(&self, robot: &Robot, trial: &Trial) -> Table {
-        let right = self
-            .last_second()
-            .filter(|instant| instant.right_link)
-            .count();
-        let right = 100.0 * right as f64 / self.last_second().count().max(1) as f64;
-        let settled = match self.settled_secs(0.02) {
-            Some(secs) => format!("after {secs:.2} s"),
-            None => "not at the end".to_owned(),
-        };
-        let mut facts = vec![
-            ("touched link", robot.links[trial.link].name.clone()),
-            ("right link in the last second", format!("{right:.0} %")),
-            ("median error in the last second", millimetres(self.error())),
-            ("error stays below 20 mm", settled),
-        ];
-        if let Some(Moment {
-            best: Some(best),
-            truth: Some(truth),
-            ..
-        }) = self.moments.last()
-        {
-            let true_force = truth.force_in_root.norm();
-            let forces = format!("{:.1} N estimated, {true_force:.1} N true", best.force);
-            facts.push(("force at the end", forces));
-        }
-        if let Some(track) = &self.track {
-            let secs = track.filter_time.as_secs_f64();
-            let speed = track.span_secs() / secs.max(1e-9);
-            facts.push(("filter", format!("{secs:.2} s, {speed:.1} × real time")));
-        }
-        table::facts(&facts)
-    }
-}
-
-fn millimetres(metres: f64) -> String {
-    match 1e3 * metres {
-        small if small < 1.0 => format!("{small:.2} mm"),
-        large if large.is_finite() => format!("{large:.1} mm"),
-        _ => "no estimate".to_owned(),
-    }
-}
-
-/// How well the contact is known now.
-pub fn instant(filter: &Filter, truth: &Truth) -> Instant {
-    let estimate = filter.estimate();
-    let best = estimate.best();
-    let pair = best.zip(truth.contact.as_ref());
-    Instant {
-        secs: truth.stamp_ns as f64 * 1e-9,
-        status: estimate.status,
-        error: pair.map(|(mode, contact)| (mode.point_in_root - contact.point_in_root).norm()),
-        std: best.map(|mode| mode.std()),
-        right_link: best.is_some_and(|mode| mode.link == truth.link),
-    }
-}
-
-/// All that the filter knows now, with the truth.
-pub fn moment(robot: &Robot, filter: &Filter, truth: &Truth, secs: f64) -> Moment {
-    let (kinematics, estimate) = (filter.kinematics(), filter.estimate());
-    let scene = Scene::new(robot, kinematics, estimate, filter.particles());
-    Moment {
-        secs,
-        kinematics: kinematics.clone(),
-        cloud: scene.cloud,
-        best: estimate.best().cloned(),
-        truth: truth.contact,
-    }
-}
-
-const LINE_HEAD: &str =
-    "  time  status     link         prob.    error    std   force estimated / true";
-
-fn line(robot: &Robot, filter: &Filter, truth: &Truth, instant: &Instant) -> String {
-    let start = format!("{:5.2} s  {:9}", instant.secs, instant.status.word());
-    let true_force = truth
-        .contact
-        .map_or(0.0, |contact| contact.force_in_root.norm());
-    let Some(mode) = filter.estimate().best() else {
-        return format!("{start}  –                                   – / {true_force:.1} N");
-    };
-    let error = instant
-        .error
-        .map_or("–".to_owned(), |error| format!("{:.1} mm", 1e3 * error));
-    let std = format!("{:.1} mm", 1e3 * mode.std());
-    format!(
-        "{start}  {:11} {:4.0} %  {error:>8} {std:>8}  {:6.1} N / {true_force:.1} N",
-        robot.links[mode.link].name,
-        100.0 * mode.probability,
-        mode.force
-    )
 }

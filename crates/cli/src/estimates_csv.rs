@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use palpate_model::Robot;
@@ -10,10 +10,10 @@ use palpate_model::Robot;
 use crate::track::Estimated;
 
 /// Names of the columns.
-pub const HEADER: &str = "stamp_ns,status,link,x,y,z,nx,ny,nz,force,stiffness,std,probability";
+const HEADER: &str = "stamp_ns,status,link,x,y,z,nx,ny,nz,force,stiffness,std,probability";
 
 /// A row. Without contact the fields after the status are empty.
-pub fn row(robot: &Robot, estimated: &Estimated) -> String {
+fn row(robot: &Robot, estimated: &Estimated) -> String {
     let start = format!("{},{}", estimated.stamp_ns, estimated.status.word());
     let Some(mode) = &estimated.best else {
         return start + ",,,,,,,,,,,";
@@ -35,18 +35,35 @@ pub fn row(robot: &Robot, estimated: &Estimated) -> String {
     )
 }
 
-/// Writes all rows, with the header, to a file.
-pub fn write(path: &Path, robot: &Robot, estimates: &[Estimated]) -> Result<()> {
-    write_rows(path, robot, estimates).with_context(|| format!("cannot write {}", path.display()))
+/// A CSV file to be written. It is made before the long work, so that a wrong path is told at once.
+pub struct EstimatesCsv {
+    path: PathBuf,
+    file: BufWriter<File>,
 }
 
-fn write_rows(path: &Path, robot: &Robot, estimates: &[Estimated]) -> std::io::Result<()> {
-    let mut file = BufWriter::new(File::create(path)?);
-    writeln!(file, "{HEADER}")?;
-    for estimated in estimates {
-        writeln!(file, "{}", row(robot, estimated))?;
+impl EstimatesCsv {
+    /// Makes the file.
+    pub fn create(path: &Path) -> Result<Self> {
+        let file = File::create(path).with_context(|| cannot_write(path))?;
+        Ok(Self {
+            path: path.to_owned(),
+            file: BufWriter::new(file),
+        })
     }
-    file.flush()
+
+    /// Writes the header and all rows.
+    pub fn write(mut self, robot: &Robot, estimates: &[Estimated]) -> Result<()> {
+        let rows = estimates.iter().map(|estimated| row(robot, estimated));
+        std::iter::once(HEADER.to_owned())
+            .chain(rows)
+            .try_for_each(|line| writeln!(self.file, "{line}"))
+            .and_then(|()| self.file.flush())
+            .with_context(|| cannot_write(&self.path))
+    }
+}
+
+fn cannot_write(path: &Path) -> String {
+    format!("cannot write {}", path.display())
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ mod replay;
 mod robot_args;
 mod simulate;
 mod table;
+mod told;
 mod track;
 
 use std::error::Error;
@@ -32,7 +33,7 @@ use palpate_sim::SimError;
 #[command(version, max_term_width = 110)]
 struct Cli {
     /// Say more on stderr: -v what is done, -vv every detail. The variable RUST_LOG, where set, decides instead
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, display_order = 1000)]
     verbose: u8,
     #[command(subcommand)]
     command: Command,

@@ -9,11 +9,12 @@ use palpate_bag::{Bag, Recording, TopicChoice, TopicReport, read_samples};
 use palpate_filter::{ContactStatus, Filter, Settings};
 use palpate_model::{JointSample, Robot};
 
+use crate::estimates_csv::EstimatesCsv;
 use crate::last_second::LastSecond;
 use crate::recorder::Recorder;
 use crate::robot_args::RobotArgs;
 use crate::track::{Track, track};
-use crate::{estimates_csv, progress, read_text, table};
+use crate::{Usage, progress, read_text, table};
 
 /// Estimate the contacts of a recorded bag
 ///
@@ -57,6 +58,7 @@ impl Replay {
     /// Runs the command.
     pub fn run(&self) -> Result<()> {
         let start = Instant::now();
+        self.keep_the_bag()?;
         let mut settings = match &self.config {
             Some(path) => Settings::read(path).with_context(|| path.display().to_string())?,
             None => Settings::default(),
@@ -65,6 +67,11 @@ impl Replay {
         set_threads(self.threads)?;
         let (robot, _) = (self.robot).load(&settings.robot, &settings.robot.load_options())?;
         let recording = self.read(&robot, &settings)?;
+        let csv = self
+            .estimates
+            .as_deref()
+            .map(EstimatesCsv::create)
+            .transpose()?;
         let mut filter = Filter::new(&robot, &settings.filter, settings.seed)?;
         let bar = progress::bar(recording.samples.len(), "replay", self.quiet);
         let jump_secs = settings.input.time_jump_secs;
@@ -80,12 +87,27 @@ impl Replay {
         let track = track(&mut filter, robot.dof(), &recording.samples, jump_secs, see)?;
         recorder.map(Recorder::finish).transpose()?;
         bar.finish_and_clear();
-        if let Some(path) = &self.estimates {
-            estimates_csv::write(path, &robot, &track.estimates)?;
+        if let Some(csv) = csv {
+            csv.write(&robot, &track.estimates)?;
         }
         if !self.quiet {
             let wall_secs = start.elapsed().as_secs_f64();
             table::print(&table::facts(&facts(&robot, &recording, &track, wall_secs)))?;
+        }
+        Ok(())
+    }
+
+    /// Refuses to write over the bag that is read.
+    fn keep_the_bag(&self) -> Result<()> {
+        let Ok(bag) = self.bag.canonicalize() else {
+            return Ok(());
+        };
+        for path in [&self.out, &self.estimates].into_iter().flatten() {
+            if path.canonicalize().is_ok_and(|path| path.starts_with(&bag)) {
+                let path = path.display();
+                let said = format!("{path} belongs to the bag that is read: name another file");
+                return Err(Usage(said).into());
+            }
         }
         Ok(())
     }

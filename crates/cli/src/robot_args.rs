@@ -11,10 +11,12 @@ use crate::Usage;
 
 #[derive(Args)]
 pub struct RobotArgs {
-    /// The robot's URDF (xacro already run)
+    /// The robot's URDF, xacro already run [default: replay takes `robot.description_file` of its --config, simulate the
+    /// iiwa 14 that ships]
     #[arg(long, value_name = "FILE")]
     pub urdf: Option<PathBuf>,
     /// A folder in which `package://NAME/…` of the URDF is looked for, beside AMENT_PREFIX_PATH; may be given often
+    /// [default: none]
     #[arg(long = "package-dir", value_name = "DIR")]
     pub package_dirs: Vec<PathBuf>,
 }

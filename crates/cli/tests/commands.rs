@@ -250,6 +250,19 @@ fn nothing_is_overwritten_by_a_simulation() {
 }
 
 #[test]
+fn the_bag_that_is_read_is_not_written_over() {
+    let trial = Trial::new();
+    trial.replay("trial/bag", &["--out", &trial.path("bag.mcap")]);
+    let before = fs::read(trial.path("bag.mcap")).unwrap();
+    for option in ["--out", "--estimates"] {
+        let bag = trial.path("bag.mcap");
+        let said = refused(2, &["replay", &bag, "--urdf", URDF, option, &bag]);
+        assert!(said.contains("bag.mcap"), "{said}");
+    }
+    assert_eq!(fs::read(trial.path("bag.mcap")).unwrap(), before);
+}
+
+#[test]
 fn a_truncated_bag_is_read_as_far_as_it_goes_or_refused() {
     let trial = Trial::new();
     // Its clouds fill several chunks.
