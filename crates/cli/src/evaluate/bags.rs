@@ -222,25 +222,49 @@ fn told(estimator: Estimator, trials: &[Recorded], scores: Vec<Score>) -> String
     let outcomes: Vec<Outcome> = scores.into_iter().map(Ok).collect();
     let mut by_link: BTreeMap<(&str, usize), Vec<&Outcome>> = BTreeMap::new();
     for (trial, outcome) in trials.iter().zip(&outcomes) {
-        by_link.entry((&trial.set, trial.link)).or_default().push(outcome);
+        by_link
+            .entry((&trial.set, trial.link))
+            .or_default()
+            .push(outcome);
     }
     let each = (trials.iter().zip(&outcomes)).map(|(trial, outcome)| {
-        row(vec![trial.name.clone(), trial.link.to_string()], &Summary::of([outcome]))
+        row(
+            vec![trial.name.clone(), trial.link.to_string()],
+            &Summary::of([outcome]),
+        )
     });
     let sets: BTreeSet<_> = trials.iter().map(|trial| trial.set.as_str()).collect();
     let mut links = Vec::new();
     for set in sets {
         let of_set = || by_link.iter().filter(|((s, _), _)| *s == set);
         for ((_, link), outcomes) in of_set() {
-            links.push(row(vec![set.to_owned(), link.to_string()], &Summary::of(outcomes.iter().copied())));
+            links.push(row(
+                vec![set.to_owned(), link.to_string()],
+                &Summary::of(outcomes.iter().copied()),
+            ));
         }
         let all = of_set().flat_map(|(_, outcomes)| outcomes.iter().copied());
-        links.push(row(vec![set.to_owned(), "all".to_owned()], &Summary::of(all)));
+        links.push(row(
+            vec![set.to_owned(), "all".to_owned()],
+            &Summary::of(all),
+        ));
     }
     let columns = |first: &str| {
         heads(&[
-            first, "link", "trials", "median mm", "mean mm", "most mm", "< 2 cm %", "right link %", "force N", "settled s",
-            "in 50 %", "in 90 %", "ambiguous %", "std mm",
+            first,
+            "link",
+            "trials",
+            "median mm",
+            "mean mm",
+            "most mm",
+            "< 2 cm %",
+            "right link %",
+            "force N",
+            "settled s",
+            "in 50 %",
+            "in 90 %",
+            "ambiguous %",
+            "std mm",
         ])
     };
     let reached = targets::table(&targets::BAGS, |set, link| {
@@ -260,7 +284,11 @@ fn told(estimator: Estimator, trials: &[Recorded], scores: Vec<Score>) -> String
 
 fn row(mut start: Vec<String>, s: &Summary) -> Vec<String> {
     let [half, most] = s.held.map(percent);
-    let force = if s.force_error.is_finite() { format!("{:.2}", s.force_error) } else { "–".to_owned() };
+    let force = if s.force_error.is_finite() {
+        format!("{:.2}", s.force_error)
+    } else {
+        "–".to_owned()
+    };
     start.extend([
         s.count.to_string(),
         millimetres(s.error_median),

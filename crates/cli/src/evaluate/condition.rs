@@ -44,11 +44,7 @@ impl Condition {
     pub fn known_robot(&self, robot: &Robot) -> Robot {
         let mut known = robot.clone();
         if let Some(edge) = self.filter_mesh_edge {
-            for mesh in known
-                .links
-                .iter_mut()
-                .filter_map(|link| link.mesh.as_mut())
-            {
+            for mesh in known.links.iter_mut().filter_map(|link| link.mesh.as_mut()) {
                 *mesh = coarsen(mesh, edge);
             }
         }
@@ -58,9 +54,9 @@ impl Condition {
 
 /// Every condition.
 pub static CONDITIONS: [Condition; 12] = [
-    Condition::new("sphere", "sphere of 30 mm radius, 10 % noise", |_| {}),
     Condition::new("noise0", "sphere, no noise", |s| s.noise_fraction = 0.0),
     Condition::new("noise5", "sphere, 5 % noise", |s| s.noise_fraction = 0.05),
+    Condition::new("noise10", "sphere of 30 mm radius, 10 % noise", |_| {}),
     Condition::new(
         "edge",
         "edge of a cube of 100 mm, rounded by 5 mm, 10 % noise",

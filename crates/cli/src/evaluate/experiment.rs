@@ -10,7 +10,7 @@ pub struct Experiment {
     pub title: &'static str,
     /// Names of its conditions.
     pub conditions: &'static [&'static str],
-    /// What estimates.
+    /// What estimates, if nothing else is asked for.
     pub estimators: &'static [Estimator],
     /// What is told about it.
     pub view: View,
@@ -40,7 +40,7 @@ pub static EXPERIMENTS: [Experiment; 16] = [
     Experiment {
         name: "progress",
         title: "Particles as the contact is found (the paper's figure 3)",
-        conditions: &["sphere"],
+        conditions: &["noise10"],
         estimators: BOTH,
         view: View::Progress,
     },
@@ -49,33 +49,33 @@ pub static EXPERIMENTS: [Experiment; 16] = [
         ..error(
             "models",
             "Motion models and methods (the paper's figure 4)",
-            &["sphere"],
+            &["noise10"],
         )
     },
     error(
         "noise",
         "Torque noise of 0, 5 and 10 % of each joint's rms (the paper's figure 5)",
-        &["noise0", "noise5", "sphere"],
+        &["noise0", "noise5", "noise10"],
     ),
     error("edge", "A cube's edge (the paper's figure 6)", &["edge"]),
     error("bias", "A bias on every joint", &["bias"]),
     error("friction", "Friction", &["friction"]),
-    error("floor", "Noise on every joint", &["floor"]),
-    error("cylinder", "A pole", &["cylinder"]),
-    error("plane", "A plane", &["plane"]),
-    error("mesh15", "A coarse mesh in the filter", &["mesh15"]),
     error("finer", "A true mesh finer than the filter's", &["finer"]),
-    error("drift", "An obstacle that drifts", &["drift"]),
+    ours("mesh15", "A coarse mesh in the filter", &["mesh15"]),
+    ours("floor", "Noise on every joint", &["floor"]),
+    ours("cylinder", "A pole", &["cylinder"]),
+    ours("plane", "A plane", &["plane"]),
+    ours("drift", "An obstacle that drifts", &["drift"]),
     Experiment {
         view: View::Convergence,
-        ..error("convergence", "Time to converge", &["sphere", "finer"])
+        ..error("convergence", "Time to converge", &["noise10", "finer"])
     },
     Experiment {
         view: View::Calibration,
         ..error(
             "calibration",
             "Truth within the estimate's 50 and 90 % region",
-            &["sphere", "finer", "bias", "friction", "edge"],
+            &["noise10", "finer", "bias", "friction", "edge"],
         )
     },
     Experiment {
@@ -83,20 +83,20 @@ pub static EXPERIMENTS: [Experiment; 16] = [
         ..error(
             "rightlink",
             "Share of the last second with the right link",
-            &["sphere", "finer", "bias", "friction", "edge"],
+            &["noise10", "finer", "bias", "friction", "edge"],
         )
     },
     Experiment {
-        estimators: &[Palpate],
         view: View::Targets,
-        ..error(
+        ..ours(
             "targets",
             "Measured values beside those to reach",
-            &["sphere", "finer", "bias", "friction", "edge"],
+            &["noise10", "finer", "bias", "friction", "edge"],
         )
     },
 ];
 
+/// Position error of both methods.
 const fn error(
     name: &'static str,
     title: &'static str,
@@ -108,6 +108,18 @@ const fn error(
         conditions,
         estimators: BOTH,
         view: View::Error,
+    }
+}
+
+/// The same, of this project's method alone.
+const fn ours(
+    name: &'static str,
+    title: &'static str,
+    conditions: &'static [&'static str],
+) -> Experiment {
+    Experiment {
+        estimators: &[Palpate],
+        ..error(name, title, conditions)
     }
 }
 

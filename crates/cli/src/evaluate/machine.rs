@@ -8,14 +8,24 @@ pub fn facts() -> Vec<(&'static str, String)> {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     let mut facts = vec![
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
-        ("commit", commit().unwrap_or_else(|| "not from a checkout".to_owned())),
+        (
+            "commit",
+            commit().unwrap_or_else(|| "not from a checkout".to_owned()),
+        ),
         (
             "machine",
-            format!("{}, {cores} cores available, {}", processor(), std::env::consts::OS),
+            format!(
+                "{}, {cores} cores available, {}",
+                processor(),
+                std::env::consts::OS
+            ),
         ),
     ];
     if cfg!(debug_assertions) {
-        facts.push(("build", "with debug assertions: slower than a release".to_owned()));
+        facts.push((
+            "build",
+            "with debug assertions: slower than a release".to_owned(),
+        ));
     }
     facts
 }

@@ -59,7 +59,7 @@ pub struct Evaluate {
     /// Numbers of the links to touch: how many joints move them [default: all]
     #[arg(long, value_name = "N,…", value_delimiter = ',')]
     links: Vec<usize>,
-    /// Only these methods: curvature, link, world (the paper's, by motion model), palpate [default: the experiment's]
+    /// The methods to measure: curvature, link, world (the paper's, by motion model), palpate [default: the experiment's]
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     methods: Vec<String>,
     /// Number of the paper's particles and of palpate's hypotheses [default: the parameters' defaults, 10000 and 500]
@@ -106,12 +106,22 @@ impl Evaluate {
         let mut campaign = Campaign::new(setup, self.threads);
         let mut report = Report::new(self.out.clone())?;
         let start = Instant::now();
-        let bar = progress::bar(self.total(&campaign, &experiments, &links)?, "evaluate", self.quiet);
+        let bar = progress::bar(
+            self.total(&campaign, &experiments, &links)?,
+            "evaluate",
+            self.quiet,
+        );
         for experiment in experiments {
             let estimators = self.estimators(experiment)?;
             if experiment.view == View::Progress {
-                let text =
-                    particles::run(&campaign, experiment, &links, &estimators, &bar, &mut report)?;
+                let text = particles::run(
+                    &campaign,
+                    experiment,
+                    &links,
+                    &estimators,
+                    &bar,
+                    &mut report,
+                )?;
                 bar.suspend(|| terminal::print(&text))?;
                 continue;
             }
@@ -135,7 +145,9 @@ impl Evaluate {
             return Ok(EXPERIMENTS.iter().collect());
         }
         let named = |name: &String| {
-            let known = EXPERIMENTS.iter().find(|experiment| experiment.name == name);
+            let known = EXPERIMENTS
+                .iter()
+                .find(|experiment| experiment.name == name);
             known.ok_or_else(|| {
                 let names: Vec<_> = EXPERIMENTS.iter().map(|e| e.name).collect();
                 Usage(format!(
@@ -144,28 +156,34 @@ impl Evaluate {
                 ))
             })
         };
-        Ok(self.experiments.iter().map(named).collect::<Result<_, _>>()?)
+        Ok(self
+            .experiments
+            .iter()
+            .map(named)
+            .collect::<Result<_, _>>()?)
     }
 
-    /// The experiment's estimators, without those that are not asked for.
+    /// The estimators asked for, else the experiment's own.
     fn estimators(&self, experiment: &Experiment) -> Result<Vec<Estimator>> {
-        let asked = self.asked_estimators()?;
-        let estimators = experiment.estimators.iter().copied();
-        Ok(estimators.filter(|e| asked.contains(e)).collect())
+        match self.methods.is_empty() || experiment.view == View::Targets {
+            true => Ok(experiment.estimators.to_vec()),
+            false => self.asked_estimators(),
+        }
     }
 
     fn asked_estimators(&self) -> Result<Vec<Estimator>> {
-        if self.methods.is_empty() {
-            return Ok(Estimator::ALL.to_vec());
-        }
         let named = |name: &String| {
-            let known = Estimator::ALL.into_iter().find(|estimator| estimator.name() == name);
+            let known = (Estimator::ALL.into_iter()).find(|estimator| estimator.name() == name);
             known.ok_or_else(|| {
                 let names = Estimator::ALL.map(Estimator::name).join(", ");
                 Usage(format!("--methods {name}: expected some of {names}"))
             })
         };
-        Ok(self.methods.iter().map(named).collect::<Result<_, _>>()?)
+        Ok(self
+            .methods
+            .iter()
+            .map(named)
+            .collect::<Result<_, _>>()?)
     }
 
     fn load_robot(&self) -> Result<Robot> {
@@ -191,13 +209,24 @@ impl Evaluate {
         Ok(all.into_iter().filter(|n| self.links.contains(n)).collect())
     }
 
+    /// The links whose particles are shown: those asked for, else the third as in the paper.
+    fn shown(&self, links: &[usize]) -> Vec<usize> {
+        let is_shown = |link: &&usize| !self.links.is_empty() || **link == 3;
+        links.iter().filter(is_shown).copied().collect()
+    }
+
     /// How many trials there are to run.
-    fn total(&self, campaign: &Campaign, experiments: &[&Experiment], links: &[usize]) -> Result<usize> {
+    fn total(
+        &self,
+        campaign: &Campaign,
+        experiments: &[&Experiment],
+        links: &[usize],
+    ) -> Result<usize> {
         let (mut all, mut watched) = (Vec::new(), 0);
         for experiment in experiments {
             let estimators = self.estimators(experiment)?;
             match experiment.view {
-                View::Progress => watched += estimators.len() * links.len(),
+                View::Progress => watched += estimators.len() * self.shown(links).len(),
                 _ => all.extend(cells(experiment, &estimators, links)),
             }
         }

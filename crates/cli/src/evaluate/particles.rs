@@ -14,7 +14,7 @@ use super::report::Report;
 use super::score::Score;
 use super::table::{heads, markdown, millimetres};
 use super::trial::{Cell, Setup};
-use crate::demo;
+use crate::told;
 use crate::picture::{Instant, Moment, Picture};
 
 /// Times at which the particles are shown, s; the last one is the end.
@@ -117,14 +117,14 @@ impl<'a> Album<'a> {
         let Some(truth) = self.trial.truth.get(self.history.len()) else {
             return;
         };
-        let instant = demo::instant(filter, truth);
+        let instant = told::instant(filter, truth);
         let secs = instant.secs;
         self.history.push(instant);
         let is_last = self.history.len() == self.trial.truth.len();
         let due = SHOWN_SECS.get(self.moments.len());
         let is_due = due.is_some_and(|due| secs >= *due) && !filter.particles().is_empty();
         if is_due || is_last {
-            let moment = demo::moment(&self.setup.robot, filter, truth, secs);
+            let moment = told::moment(&self.setup.robot, filter, truth, secs);
             self.moments.push(moment);
         }
     }

@@ -95,6 +95,9 @@ mod tests {
     #[test]
     fn another_link_is_outside() {
         let given = estimate(Matrix3::identity());
-        assert_eq!(holds(&given, 4, &Point3::new(0.1, 0.2, 0.3)), [false, false]);
+        assert_eq!(
+            holds(&given, 4, &Point3::new(0.1, 0.2, 0.3)),
+            [false, false]
+        );
     }
 }

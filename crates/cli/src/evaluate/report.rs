@@ -99,7 +99,10 @@ impl Report {
     /// Says where the files are.
     pub fn tell(&self) -> Result<()> {
         if let Some(folder) = &self.folder {
-            terminal::print(&format!("Written to {}: report.md, CSV and plots", folder.display()))?;
+            terminal::print(&format!(
+                "Written to {}: report.md, CSV and plots",
+                folder.display()
+            ))?;
         }
         Ok(())
     }
@@ -117,7 +120,10 @@ pub fn wall_time(wall: Duration, threads: usize) -> String {
 fn details(campaign: &Campaign) -> String {
     let mut text = String::from("## All cells\n");
     for condition in &condition::CONDITIONS {
-        if campaign.all().any(|(cell, _)| cell.condition == condition.name) {
+        if campaign
+            .all()
+            .any(|(cell, _)| cell.condition == condition.name)
+        {
             text += &format!("\n### {}", table::details(campaign, condition.name));
         }
     }

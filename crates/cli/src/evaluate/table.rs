@@ -52,7 +52,12 @@ pub fn heads(words: &[&str]) -> Vec<String> {
 }
 
 /// The table of an experiment: a row for each condition and estimator, a column for each link.
-pub fn of_experiment(campaign: &Campaign, experiment: &Experiment, links: &[usize], estimators: &[Estimator]) -> String {
+pub fn of_experiment(
+    campaign: &Campaign,
+    experiment: &Experiment,
+    links: &[usize],
+    estimators: &[Estimator],
+) -> String {
     let mut columns = heads(&["condition", "method"]);
     columns.extend(links.iter().map(|link| format!("link {link}")));
     let mut rows = Vec::new();
@@ -70,7 +75,11 @@ pub fn of_experiment(campaign: &Campaign, experiment: &Experiment, links: &[usiz
             rows.push(row);
         }
     }
-    format!("{}\n\n{}", legend(experiment.view), markdown(&columns, &rows, 2))
+    format!(
+        "{}\n\n{}",
+        legend(experiment.view),
+        markdown(&columns, &rows, 2)
+    )
 }
 
 fn legend(view: View) -> String {
@@ -84,7 +93,9 @@ fn legend(view: View) -> String {
             super::region::MEANING
         ),
         View::RightLink => "Mean share of the last second that names the right link, %.".to_owned(),
-        _ => "Median over trials of the position error (median over the last second), mm.".to_owned(),
+        _ => {
+            "Median over trials of the position error (median over the last second), mm.".to_owned()
+        }
     }
 }
 

@@ -1,21 +1,13 @@
 //! Error over time, link by link.
 
-use super::panel::{Panel, Scale};
-use super::{Data, RIGHT};
+use super::panel::{ERROR, ERROR_TICKS, Panel, Scale, shown_error};
+use super::{Data, FOOT, RIGHT};
 use crate::evaluate::condition;
 use crate::evaluate::score::{COURSE_SECS, FOUND};
 use crate::evaluate::trial::Cell;
 use crate::last_second::median;
 use crate::picture::svg::{Anchor, Svg};
 
-const TICKS: [(f64, &str); 6] = [
-    (0.01, "0.01"),
-    (0.1, "0.1"),
-    (1.0, "1"),
-    (10.0, "10"),
-    (100.0, "100"),
-    (1000.0, "1000"),
-];
 const HEIGHT: f64 = 260.0;
 /// Colours of links, from the base outwards.
 const COLOURS: [&str; 7] = [
@@ -27,32 +19,41 @@ pub fn draw(data: &Data) -> String {
         .flat_map(|&condition| data.estimators.iter().map(move |&e| (condition, e)))
         .collect();
     let subtitle = "median over trials of the position error, by link";
-    data.draw(subtitle, all.len(), HEIGHT + 90.0, |svg, index, [left, top]| {
-        let Some(&(name, estimator)) = all.get(index) else {
-            return;
-        };
-        let panel = Panel {
-            at: [left, top + 34.0],
-            size: [RIGHT - left, HEIGHT],
-            x: Scale::Linear(0.0, data.campaign.setup.secs),
-            y: Scale::Decades(0.01, 1000.0),
-        };
-        let condition = condition::named(name).map_or("", |condition| condition.title);
-        let title = format!("{}: {condition}", estimator.title());
-        svg.text([left, top + 22.0], Anchor::Start, "head", &title);
-        panel.draw_y(svg, &TICKS, "position error, mm");
-        panel.mark(svg, 1e3 * FOUND, "2 cm");
-        for (link, colour) in data.links.iter().zip(COLOURS.iter().cycle()) {
-            let cell = Cell {
-                condition: name,
-                estimator,
-                link: *link,
+    data.draw(
+        subtitle,
+        all.len(),
+        HEIGHT + 34.0 + FOOT,
+        |svg, index, [left, top]| {
+            let Some(&(name, estimator)) = all.get(index) else {
+                return;
             };
-            draw_course(svg, data, &panel, &cell, colour);
-        }
-        draw_legend(svg, data.links, [left + 12.0, top + 34.0 + HEIGHT - 10.0]);
-        panel.draw_x(svg, &time_ticks(data.campaign.setup.secs), "time from first contact, s");
-    })
+            let panel = Panel {
+                at: [left, top + 34.0],
+                size: [RIGHT - left, HEIGHT],
+                x: Scale::Linear(0.0, data.campaign.setup.secs),
+                y: ERROR,
+            };
+            let condition = condition::named(name).map_or("", |condition| condition.title);
+            let title = format!("{}: {condition}", estimator.title());
+            svg.text([left, top + 22.0], Anchor::Start, "head", &title);
+            panel.draw_y(svg, &ERROR_TICKS, "position error, mm");
+            panel.mark(svg, shown_error(FOUND), "2 cm");
+            for (link, colour) in data.links.iter().zip(COLOURS.iter().cycle()) {
+                let cell = Cell {
+                    condition: name,
+                    estimator,
+                    link: *link,
+                };
+                draw_course(svg, data, &panel, &cell, colour);
+            }
+            draw_legend(svg, data.links, [left + 12.0, top + 34.0 + HEIGHT - 10.0]);
+            panel.draw_x(
+                svg,
+                &time_ticks(data.campaign.setup.secs),
+                "time from first contact, s",
+            );
+        },
+    )
 }
 
 fn draw_course(svg: &mut Svg, data: &Data, panel: &Panel, cell: &Cell, colour: &str) {
@@ -62,7 +63,7 @@ fn draw_course(svg: &mut Svg, data: &Data, panel: &Panel, cell: &Cell, colour: &
     let points = courses.iter().map(|course| course.len()).min().unwrap_or(0);
     let line = (0..points).map(|point| {
         let error = median(courses.iter().map(|course| course[point]));
-        panel.place(point as f64 * COURSE_SECS, 1e3 * error)
+        panel.place(point as f64 * COURSE_SECS, shown_error(error))
     });
     let path: Vec<_> = line.map(|[x, y]| format!("{x:.1} {y:.1}")).collect();
     if !path.is_empty() {
@@ -79,7 +80,12 @@ fn draw_legend(svg: &mut Svg, links: &[usize], [mut x, y]: [f64; 2]) {
             r#"<path stroke="{colour}" stroke-width="3" d="M{x:.1} {:.1}h18"/>"#,
             y - 4.0
         ));
-        svg.text([x + 23.0, y], Anchor::Start, "small", &format!("link {link}"));
+        svg.text(
+            [x + 23.0, y],
+            Anchor::Start,
+            "small",
+            &format!("link {link}"),
+        );
         x += 74.0;
     }
 }

@@ -1,28 +1,17 @@
 //! Position error by link: every trial a dot, their median a bar.
 
-use super::panel::{Panel, Scale};
-use super::{Data, RIGHT, Series, legend};
+use super::panel::{ERROR, ERROR_TICKS, Panel, Scale, shown_error};
+use super::{Data, FOOT, HEAD, RIGHT, Series, head};
 use crate::evaluate::seed::share;
 use crate::evaluate::summary::Summary;
-use crate::picture::svg::{Anchor, Svg};
+use crate::picture::svg::Svg;
 
-/// The axis, mm; where there is no estimate, dots are at its upper end.
-const RANGE: [f64; 2] = [0.01, 3000.0];
-const TICKS: [(f64, &str); 7] = [
-    (0.01, "0.01"),
-    (0.1, "0.1"),
-    (1.0, "1"),
-    (10.0, "10"),
-    (100.0, "100"),
-    (1000.0, "1000"),
-    (3000.0, "none"),
-];
 const HEIGHT: f64 = 330.0;
 
 pub fn draw(data: &Data) -> String {
     let panels = data.panels();
     let subtitle = "each dot a trial, bars the medians";
-    data.draw(subtitle, panels.len(), HEIGHT + 90.0, |svg, index, at| {
+    data.draw(subtitle, panels.len(), HEIGHT + HEAD + FOOT, |svg, index, at| {
         if let Some((title, series)) = panels.get(index) {
             draw_panel(svg, data, title, series, at);
         }
@@ -31,14 +20,13 @@ pub fn draw(data: &Data) -> String {
 
 fn draw_panel(svg: &mut Svg, data: &Data, title: &str, series: &[Series], [left, top]: [f64; 2]) {
     let panel = Panel {
-        at: [left, top + 34.0],
+        at: [left, top + HEAD],
         size: [RIGHT - left, HEIGHT],
         x: Scale::Linear(-0.5, data.links.len() as f64 - 0.5),
-        y: Scale::Decades(RANGE[0], RANGE[1]),
+        y: ERROR,
     };
-    svg.text([left, top + 22.0], Anchor::Start, "head", title);
-    legend(svg, series, [RIGHT, top + 22.0]);
-    panel.draw_y(svg, &TICKS, "position error, mm");
+    head(svg, title, series, [left, top]);
+    panel.draw_y(svg, &ERROR_TICKS, "position error, mm");
     panel.mark(svg, 20.0, "2 cm");
     let step = 0.8 / series.len().max(1) as f64;
     for (column, &link) in data.links.iter().enumerate() {
@@ -62,16 +50,16 @@ fn draw_trials(
     [middle, step]: [f64; 2],
 ) {
     let outcomes = data.campaign.outcomes(&series.cell(link));
-    let errors = outcomes.iter().flatten().map(|score| 1e3 * score.error);
+    let errors = outcomes.iter().flatten().map(|score| shown_error(score.error));
     let dots = errors.enumerate().map(|(trial, error)| {
         // Aside by chance, so that equal ones are told apart.
         let aside = share(&[link as u64, trial as u64]) - 0.5;
         panel.place(middle + 0.55 * step * aside, error)
     });
     svg.dots(dots, 5.0, series.colour);
-    let median = 1e3 * Summary::of(outcomes).error_median;
+    let median = Summary::of(outcomes).error_median;
     if !median.is_nan() {
-        let [x, y] = panel.place(middle, median);
+        let [x, y] = panel.place(middle, shown_error(median));
         let half = 0.38 * step * panel.size[0] / data.links.len() as f64;
         svg.add(format_args!(
             r#"<path stroke="{}" stroke-width="3.5" d="M{:.1} {y:.1}H{:.1}"/>"#,

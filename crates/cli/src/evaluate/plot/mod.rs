@@ -20,6 +20,10 @@ const RIGHT: f64 = 970.0;
 /// Lower edge of the title, px.
 const TOP: f64 = 66.0;
 
+/// Height of what is above a panel and of what is below it, px.
+const HEAD: f64 = 48.0;
+const FOOT: f64 = 56.0;
+
 const STYLE: &str = "text{font-family:'Helvetica Neue',Helvetica,Arial,sans-serif;fill:#24292f}\
 .title{font-size:20px;font-weight:600}.subtitle{font-size:14px;fill:#57606a}\
 .head{font-size:15px;font-weight:600}.label{font-size:13px}.small{font-size:12px;fill:#57606a}\
@@ -141,13 +145,17 @@ fn colour_of(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Draws the names of series in a row that ends at `right`, px.
-fn legend(svg: &mut Svg, series: &[Series], [right, y]: [f64; 2]) {
-    let wide = |name: &str| 28.0 + 7.2 * name.chars().count() as f64;
-    let mut x = right - series.iter().map(|s| wide(&s.name)).sum::<f64>();
+/// Draws a panel's title and below it the names of its series, in the room of [`HEAD`] px above the panel.
+fn head(svg: &mut Svg, title: &str, series: &[Series], [left, top]: [f64; 2]) {
+    svg.text([left, top + 18.0], Anchor::Start, "head", title);
+    let (mut x, y) = (left, top + 38.0);
     for Series { name, colour, .. } in series {
-        svg.dots(std::iter::once([x + 6.0, y - 4.5]), 9.0, colour);
-        svg.text([x + 16.0, y], Anchor::Start, "label", name);
-        x += wide(name);
+        svg.add(format_args!(
+            r#"<circle fill="{colour}" cx="{:.1}" cy="{:.1}" r="4.5"/>"#,
+            x + 5.0,
+            y - 4.5
+        ));
+        svg.text([x + 15.0, y], Anchor::Start, "label", name);
+        x += 36.0 + 7.0 * name.chars().count() as f64;
     }
 }

@@ -22,6 +22,26 @@ impl Scale {
     }
 }
 
+/// The axis of position errors, mm.
+pub const ERROR: Scale = Scale::Decades(0.003, 5000.0);
+/// Where errors are shown that are infinite for want of an estimate, mm.
+const NO_ESTIMATE: f64 = 3000.0;
+/// The names along [`ERROR`].
+pub const ERROR_TICKS: [(f64, &str); 7] = [
+    (0.01, "0.01"),
+    (0.1, "0.1"),
+    (1.0, "1"),
+    (10.0, "10"),
+    (100.0, "100"),
+    (1000.0, "1000"),
+    (NO_ESTIMATE, "none"),
+];
+
+/// Where along [`ERROR`] an error in metres is shown.
+pub fn shown_error(metres: f64) -> f64 {
+    (1e3 * metres).min(NO_ESTIMATE)
+}
+
 /// A rectangle with two axes, px.
 pub struct Panel {
     pub at: [f64; 2],

@@ -1,9 +1,9 @@
 //! Shares by link: truth within the region, and right link.
 
 use super::panel::{Panel, Scale};
-use super::{Data, RIGHT, Series, legend};
+use super::{Data, FOOT, HEAD, RIGHT, Series, head};
 use crate::evaluate::summary::Summary;
-use crate::picture::svg::{Anchor, Svg};
+use crate::picture::svg::Svg;
 
 const TICKS: [(f64, &str); 6] = [
     (0.0, "0"),
@@ -19,24 +19,34 @@ const HEIGHT: f64 = 230.0;
 pub fn draw_calibration(data: &Data) -> String {
     let panels = data.panels();
     let subtitle = "share of trials whose truth lies in the estimate's region, with 95 % intervals";
-    data.draw(subtitle, 2 * panels.len(), HEIGHT + 88.0, |svg, index, at| {
-        let Some((title, series)) = panels.get(index / 2) else {
-            return;
-        };
-        let level = index % 2;
-        let nominal = crate::evaluate::region::LEVELS[level];
-        let title = format!("{title}: {:.0} % region", 100.0 * nominal);
-        let value = |summary: &Summary| (summary.held[level], interval(summary.held[level], summary.count));
-        let panel = draw_panel(svg, data, (&title, series), at, "trials, %", &value);
-        panel.mark(svg, nominal, &format!("{:.0} %", 100.0 * nominal));
-    })
+    data.draw(
+        subtitle,
+        2 * panels.len(),
+        HEIGHT + HEAD + FOOT,
+        |svg, index, at| {
+            let Some((title, series)) = panels.get(index / 2) else {
+                return;
+            };
+            let level = index % 2;
+            let nominal = crate::evaluate::region::LEVELS[level];
+            let title = format!("{title}: {:.0} % region", 100.0 * nominal);
+            let value = |summary: &Summary| {
+                (
+                    summary.held[level],
+                    interval(summary.held[level], summary.count),
+                )
+            };
+            let panel = draw_panel(svg, data, (&title, series), at, "trials, %", &value);
+            panel.mark(svg, nominal, &format!("{:.0} %", 100.0 * nominal));
+        },
+    )
 }
 
 /// For each method, the share of the last second with the right link.
 pub fn draw_right_link(data: &Data) -> String {
     let panels = data.panels();
     let subtitle = "mean share of the last second that names the right link";
-    data.draw(subtitle, panels.len(), HEIGHT + 88.0, |svg, index, at| {
+    data.draw(subtitle, panels.len(), HEIGHT + HEAD + FOOT, |svg, index, at| {
         if let Some((title, series)) = panels.get(index) {
             let value = |summary: &Summary| (summary.right_link, [summary.right_link; 2]);
             draw_panel(svg, data, (title, series), at, "last second, %", &value);
@@ -53,13 +63,12 @@ fn draw_panel(
     value: &dyn Fn(&Summary) -> (f64, [f64; 2]),
 ) -> Panel {
     let panel = Panel {
-        at: [left, top + 34.0],
+        at: [left, top + HEAD],
         size: [RIGHT - left, HEIGHT],
         x: Scale::Linear(-0.5, data.links.len() as f64 - 0.5),
         y: Scale::Linear(0.0, 1.04),
     };
-    svg.text([left, top + 22.0], Anchor::Start, "head", title);
-    legend(svg, series, [RIGHT, top + 22.0]);
+    head(svg, title, series, [left, top]);
     panel.draw_y(svg, &TICKS, name);
     let step = 0.8 / series.len().max(1) as f64;
     for (column, &link) in data.links.iter().enumerate() {
@@ -108,7 +117,10 @@ mod tests {
     fn intervals_stay_within_and_shrink_with_trials() {
         let [low, high] = interval(0.9, 30);
         // Wilson's interval for 27 of 30.
-        assert!((low - 0.7438).abs() < 1e-3 && (high - 0.9654).abs() < 1e-3, "{low} {high}");
+        assert!(
+            (low - 0.7438).abs() < 1e-3 && (high - 0.9654).abs() < 1e-3,
+            "{low} {high}"
+        );
         let [low, high] = interval(1.0, 30);
         assert!(low > 0.88 && high <= 1.0 + 1e-12);
     }
