@@ -26,7 +26,8 @@ if [ "$(cat "$tools/stamp" 2>/dev/null)" != "$wanted" ]; then
 fi
 
 step "the node"
-cargo build --package palpate-node --features ros2
+# All packages, as above, so that what they share is not built a second time with other features.
+cargo build --workspace --features palpate-node/ros2
 target=$(cargo metadata --no-deps --format-version 1 | "$tools/bin/python" -c \
     'import json, sys; print(json.load(sys.stdin)["target_directory"])')
 export PALPATE_NODE=$target/debug/palpate_node PALPATE=$target/debug/palpate
