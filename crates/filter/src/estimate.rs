@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
+use crate::CredibleRegion;
+
 /// What is known about a contact at one instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ContactStatus {
@@ -69,6 +71,11 @@ impl ContactEstimate {
     /// The most probable explanation; none without contact.
     pub fn best(&self) -> Option<&Mode> {
         self.modes.first()
+    }
+
+    /// The smallest region, in the root frame, that holds the contact with probability `level` (0 … 1).
+    pub fn region(&self, level: f64) -> CredibleRegion {
+        CredibleRegion::new(&self.modes, level)
     }
 
     /// Probability that `link` is the touched one: the sum over its modes.

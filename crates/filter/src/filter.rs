@@ -1,5 +1,6 @@
 //! The filter: one `update` a sample.
 
+use nalgebra::Matrix3;
 use palpate_model::{Kinematics, Robot};
 
 use crate::detector::Detector;
@@ -9,27 +10,27 @@ use crate::paper::PaperFilter;
 use crate::skin::Skin;
 use crate::step::Step;
 use crate::{
-    Admitted, ContactEstimate, ContactStatus, Method, ParameterError, Parameters, Particle,
+    Admitted, ContactEstimate, ContactStatus, Method, Mode, ParameterError, Parameters, Particle,
 };
 
 /// The method chosen, with all that it knows of the present contact.
 enum Estimator {
-    Paper(PaperFilter),
-    Palpate(PalpateFilter),
+    Paper(Box<PaperFilter>),
+    Palpate(Box<PalpateFilter>),
 }
 
 impl Estimator {
     fn new(robot: &Robot, parameters: &Parameters, seed: u64) -> Self {
         let count = parameters.particles;
         match parameters.method {
-            Method::Paper => Self::Paper(PaperFilter::new(
-                parameters.paper.clone(),
-                count,
-                robot.links.len(),
-                seed,
-            )),
+            Method::Paper => {
+                let filter =
+                    PaperFilter::new(parameters.paper.clone(), count, robot.links.len(), seed);
+                Self::Paper(Box::new(filter))
+            }
             Method::Palpate => {
-                Self::Palpate(PalpateFilter::new(robot, parameters.palpate.clone(), seed))
+                let parameters = parameters.palpate.clone();
+                Self::Palpate(Box::new(PalpateFilter::new(robot, parameters, seed)))
             }
         }
     }
@@ -45,6 +46,12 @@ impl Estimator {
         match self {
             Self::Paper(filter) => filter.step(step),
             Self::Palpate(filter) => filter.step(step, stamp_ns),
+        }
+    }
+
+    fn widen(&self, step: &Step, modes: &mut [Mode]) {
+        if let Self::Palpate(filter) = self {
+            filter.widen(step, modes);
         }
     }
 
@@ -114,6 +121,7 @@ impl Filter {
             .detector
             .update(sample.stamp_ns, &sample.external_torque);
         self.cloud.clear();
+        self.estimate.modes.clear();
         if in_contact {
             if !was_in_contact {
                 self.before.clone_from(&self.now);
@@ -134,6 +142,9 @@ impl Filter {
             };
             self.estimator.step(&step, sample.stamp_ns);
             self.estimator.show(&step, &mut self.cloud);
+            self.modes
+                .find(&self.cloud, &self.skin, &self.now, &mut self.estimate.modes);
+            self.estimator.widen(&step, &mut self.estimate.modes);
         }
         self.summarise(sample.stamp_ns, in_contact);
         self.position_before.copy_from_slice(&sample.position);
@@ -143,8 +154,10 @@ impl Filter {
 
     fn summarise(&mut self, stamp_ns: i64, in_contact: bool) {
         self.estimate.stamp_ns = stamp_ns;
-        self.modes
-            .find(&self.cloud, &self.skin, &self.now, &mut self.estimate.modes);
+        let tolerance = Matrix3::identity() * self.parameters.tolerance.powi(2);
+        for mode in &mut self.estimate.modes {
+            mode.covariance_in_root += tolerance;
+        }
         let located = self.estimate.modes.first().is_some_and(|mode| {
             mode.probability >= self.parameters.located_probability
                 && mode.std() <= self.parameters.located_std

@@ -10,6 +10,7 @@ mod paper;
 mod parameters;
 mod particle;
 mod random;
+mod region;
 mod resample;
 mod scene;
 mod settings;
@@ -24,6 +25,7 @@ pub use palpate::PalpateParameters;
 pub use paper::{MotionModel, PaperParameters};
 pub use parameters::{Method, ParameterError, Parameters};
 pub use particle::Particle;
+pub use region::CredibleRegion;
 pub use scene::{
     Arrow, CLOUD_FIELDS, CLOUD_POINT_STEP, CloudField, CloudFieldType, CloudPoint, Colour,
     ContactPose, Label, Scene, pack_cloud,

@@ -29,6 +29,8 @@ pub struct Parameters {
     pub located_probability: f64,
     /// … and at most this standard deviation of the position, m. Default 0.03.
     pub located_std: f64,
+    /// What meshes and positions are wrong by, m: added to every estimate's uncertainty. Default 0.001.
+    pub tolerance: f64,
     /// When something touches.
     pub detector: DetectorParameters,
     /// This project's filter.
@@ -44,6 +46,7 @@ impl Default for Parameters {
             particles: 10_000,
             located_probability: 0.6,
             located_std: 0.03,
+            tolerance: 0.001,
             detector: DetectorParameters::default(),
             palpate: PalpateParameters::default(),
             paper: PaperParameters::default(),
@@ -78,6 +81,8 @@ impl Parameters {
             self.located_std,
             self.located_std > 0.0,
         )?;
+        let tolerance = (0.0..=0.1).contains(&self.tolerance);
+        check("filter.tolerance", "0 … 0.1", self.tolerance, tolerance)?;
         self.detector.check()?;
         self.palpate.check()?;
         self.paper.check()

@@ -1,6 +1,6 @@
 //! Coordinates of obstacles around one of them, in which the prior is about uniform.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Unit, Vector3, Vector4};
+use nalgebra::{Isometry3, Matrix3, Matrix3x2, Point3, Rotation3, Unit, Vector3, Vector4};
 
 use super::obstacle::{Core, LINK_RADIUS, RADIUS_RANGE, Touch, touch};
 use palpate_model::Surface;
@@ -45,6 +45,11 @@ impl Chart {
     /// Number of coordinates that count: three for a ball, four for a bar.
     pub(super) fn dimension(&self) -> usize {
         if self.axis.is_some() { 4 } else { 3 }
+    }
+
+    /// The directions u and v along the surface, in the link's frame.
+    pub(super) fn sides(&self) -> Matrix3x2<f64> {
+        self.axes.matrix().fixed_columns::<2>(0).into_owned()
     }
 
     /// Radius of the curvature at x, m.

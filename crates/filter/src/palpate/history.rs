@@ -36,6 +36,13 @@ impl History<'_> {
         obstacle.evidence(self.robot, self.skin, self.keyframes, self.noise)
     }
 
+    /// The torques that a solved hypothesis predicts: one a keyframe (newest first) and joint of the link's path, Nm.
+    pub(super) fn torques(&self, obstacle: &Obstacle, evidence: &Evidence) -> Vec<f64> {
+        let mut torques = Vec::with_capacity(self.keyframes.len() * 8);
+        obstacle.predict(evidence, self, |torque, _, _| torques.push(torque));
+        torques
+    }
+
     /// Log of the prior density, in space, of an obstacle that touches at `distance`, m.
     pub(super) fn log_prior(&self, obstacle: &Obstacle, distance: f64) -> f64 {
         obstacle.log_prior(distance, self.skin.area())

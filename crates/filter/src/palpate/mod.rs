@@ -15,21 +15,23 @@ mod obstacle;
 mod parameters;
 mod peaks;
 mod scan;
+mod sight;
 
 use palpate_model::Robot;
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
 
-use crate::Particle;
 use crate::random::{Purpose, stream};
 use crate::resample::{effective_sample_size, normalise, systematic};
 use crate::step::Step;
+use crate::{Mode, Particle};
 
 use evidence::Evidence;
 pub(crate) use evidence::MOST_JOINTS;
 use history::History;
 use memory::Memory;
 use moves::Proposals;
+use nalgebra::Matrix3;
 use noise::Noise;
 use obstacle::Obstacle;
 pub use parameters::PalpateParameters;
@@ -43,6 +45,9 @@ const FIRST_DRAWS: usize = 8;
 /// Climbs from new places at each keyframe, from the best peaks first, and the steps of each.
 const HOPS: usize = 6;
 const HOP_CLIMB: usize = 3;
+
+/// Variance of a contact's place on a link without a peak, m².
+const UNSEEN: f64 = 0.01;
 
 /// One particle: an obstacle and what the history says of it.
 #[derive(Clone, Copy, Debug)]
@@ -124,9 +129,9 @@ impl PalpateFilter {
             .chain(particle)
             .max_by(|a, b| a.1.log.total_cmp(&b.1.log));
         if let Some((obstacle, evidence)) = best {
-            let keyframes = &self.memory.keyframes;
-            self.noise
-                .calibrate(&obstacle, &evidence, step.robot, step.skin, keyframes);
+            let history = history(step, &self.memory, &self.noise);
+            let inflation = self.noise.calibrated(&obstacle, &evidence, &history);
+            self.noise.inflate(inflation);
         }
     }
 
@@ -190,6 +195,9 @@ impl PalpateFilter {
             self.peaks.extend(scan::peaks(&history));
         }
         peaks::keep_best(&mut self.peaks);
+        self.peaks
+            .par_iter_mut()
+            .for_each(|peak| peak.sight = sight::sight(peak, &history));
     }
 
     /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks, and from some particles.
@@ -233,6 +241,25 @@ impl PalpateFilter {
                     proposals.mutate(particle, &mut random);
                 }
             });
+    }
+
+    /// Adds to the modes' covariances what particles cannot show: the errors that systematically wrong torques cause.
+    pub(crate) fn widen(&self, step: &Step, modes: &mut [Mode]) {
+        for mode in modes {
+            let apart = |peak: &&Peak| (peak.touch.point - mode.point_in_link).norm();
+            let nearest = (self
+                .peaks
+                .iter()
+                .filter(|peak| peak.obstacle.link as usize == mode.link))
+            .min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let sight = nearest.map_or_else(|| Matrix3::identity() * UNSEEN, |peak| peak.sight);
+            let rotation = step
+                .now
+                .root_from_link(mode.link)
+                .rotation
+                .to_rotation_matrix();
+            mode.covariance_in_root += rotation * sight * rotation.transpose();
+        }
     }
 
     /// Writes the particles, with their weights, as the outside sees them at this sample.

@@ -1,11 +1,9 @@
 //! What is known of the torques' noise: white noise by joint, a slow part, and a constant bias of unknown scale.
 
-use palpate_model::Robot;
-
 use super::evidence::Evidence;
+use super::history::History;
 use super::memory::Keyframe;
 use super::obstacle::Obstacle;
-use crate::skin::Skin;
 
 /// Standard deviations that a bias may have, Nm: which one fits, the data tell.
 const BIAS_SCALES: [f64; 3] = [0.004, 0.05, 0.25];
@@ -140,31 +138,34 @@ impl Noise {
         1.0 / (self.inflation[joint] * (self.white[joint] / keyframe.samples + slow))
     }
 
-    /// Learns from the residuals of the best hypothesis how much larger they are than expected, joint by joint.
-    pub(super) fn calibrate(
-        &mut self,
+    /// How much larger than expected the residuals of the best hypothesis are, joint by joint: the inflation to be
+    /// set with [`Noise::inflate`].
+    pub(super) fn calibrated(
+        &self,
         obstacle: &Obstacle,
         evidence: &Evidence,
-        robot: &Robot,
-        skin: &Skin,
-        keyframes: &[Keyframe],
-    ) {
+        history: &History,
+    ) -> Vec<f64> {
         let mut sums = vec![ResidualSums::default(); self.white.len()];
-        obstacle.residuals(
-            evidence,
-            robot,
-            skin,
-            keyframes,
-            self,
-            |joint, residual, weight| {
-                sums[joint].add(residual, weight);
-            },
-        );
-        for (inflation, sums) in self.inflation.iter_mut().zip(sums) {
-            if sums.count >= LEAST_RESIDUALS {
-                *inflation = (sums.variance_factor(*inflation) * sums.repetition()).clamp(1.0, 1e4);
-            }
-        }
+        obstacle.predict(evidence, history, |predicted, joint, torque| {
+            sums[joint].add(torque.measured - predicted, torque.weight);
+        });
+        let inflation =
+            |(&inflation, sums): (&f64, &ResidualSums)| match sums.count >= LEAST_RESIDUALS {
+                true => (sums.variance_factor(inflation) * sums.repetition()).clamp(1.0, 1e4),
+                false => inflation,
+            };
+        self.inflation.iter().zip(&sums).map(inflation).collect()
+    }
+
+    /// Sets the factors on the variance of each joint's noise.
+    pub(super) fn inflate(&mut self, inflation: Vec<f64>) {
+        self.inflation = inflation;
+    }
+
+    /// Root mean square of a joint's torque, Nm.
+    pub(super) fn rms(&self, joint: usize) -> f64 {
+        self.power[joint].sqrt()
     }
 
     /// Sums over the history what all hypotheses share.

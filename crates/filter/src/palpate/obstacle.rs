@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use palpate_model::{Robot, Surface};
 
 use super::evidence::{Evidence, JointTorque, Sums};
+use super::history::History;
 use super::memory::{Keyframe, LinkView};
 use super::noise::Noise;
 use crate::skin::Skin;
@@ -186,24 +187,28 @@ impl Obstacle {
         }
     }
 
-    /// What the solved hypothesis leaves of the history's torques: calls `take(joint, residual, weight)`.
-    pub(super) fn residuals(
+    /// The history's torques as the solved hypothesis predicts them, from the newest keyframe to the oldest: calls
+    /// `take(predicted, joint, measured)`.
+    pub(super) fn predict(
         &self,
         evidence: &Evidence,
-        robot: &Robot,
-        skin: &Skin,
-        keyframes: &[Keyframe],
-        noise: &Noise,
-        mut take: impl FnMut(usize, f64, f64),
+        history: &History,
+        mut take: impl FnMut(f64, usize, JointTorque),
     ) {
         let link = self.link as usize;
-        let path = &robot.links[link].path;
-        self.follow(skin, keyframes, |_, keyframe, touch| {
-            let force = evidence.force + evidence.stiffness * (evidence.reference - touch.distance);
-            let torques = joint_torques(&keyframe.links[link], keyframe, &touch, path, noise);
+        let path = &history.robot.links[link].path;
+        let mut newest = None;
+        self.follow(history.skin, history.keyframes, |_, keyframe, touch| {
+            let e = *newest.get_or_insert(touch.distance) - touch.distance;
+            let force = evidence.force + evidence.stiffness * e;
+            let torques =
+                joint_torques(&keyframe.links[link], keyframe, &touch, path, history.noise);
             for (torque, &joint) in torques.zip(path) {
-                let predicted = (torque.normal + evidence.friction * torque.tangential) * force;
-                take(joint, torque.measured - predicted, torque.weight);
+                take(
+                    (torque.normal + evidence.friction * torque.tangential) * force,
+                    joint,
+                    torque,
+                );
             }
         });
     }

@@ -1,6 +1,6 @@
 //! Peaks of the evidence: climbed by Newton's method, each with its Laplace approximation.
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix3, Matrix3x2, Matrix4, Vector4};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
@@ -10,7 +10,7 @@ use super::history::History;
 use super::obstacle::{Core, Obstacle, Touch, log_radius_prior};
 
 /// Finite-difference steps along the chart's axes: m, m, on the logarithm of the radius, rad.
-const STEPS: [f64; 4] = [1e-3, 1e-3, 0.1, 0.05];
+pub(super) const STEPS: [f64; 4] = [1e-3, 1e-3, 0.1, 0.05];
 /// Precision that the chart's axes have anyhow: a decimetre, a decimetre, a factor of five, a radian.
 const PRIOR_PRECISION: [f64; 4] = [100.0, 100.0, 0.4, 1.0];
 /// Longest Newton step along the chart's axes.
@@ -30,6 +30,8 @@ pub(super) struct Peak {
     precision: Matrix4<f64>,
     /// Lower Cholesky factor of the covariance.
     root: Matrix4<f64>,
+    /// Covariance of the contact point from systematic errors, m², in the link's frame ([`sight`]).
+    pub(super) sight: Matrix3<f64>,
 }
 
 impl Peak {
@@ -43,6 +45,7 @@ impl Peak {
             log_mass: evidence.log,
             precision: Matrix4::identity(),
             root: Matrix4::identity(),
+            sight: Matrix3::identity(),
             obstacle,
             evidence,
             touch,
@@ -62,7 +65,7 @@ impl Peak {
     fn step(&mut self, history: &History) -> f64 {
         *self = Self::new(self.obstacle, history);
         let dimension = self.chart.dimension();
-        let value = |x: &Vector4<f64>| self.at(x, history).2;
+        let value = |x: &Vector4<f64>| self.try_at(x, history).2;
         let here = value(&Vector4::zeros());
         let offset = |axis: usize, sign: f64| {
             let mut x = Vector4::zeros();
@@ -98,9 +101,7 @@ impl Peak {
         let eigen = hessian.symmetric_eigen();
         let lifted = Matrix4::from_diagonal(&eigen.eigenvalues.map(f64::abs));
         self.precision = eigen.eigenvectors * lifted * eigen.eigenvectors.transpose();
-        for axis in 0..4 {
-            self.precision[(axis, axis)] += PRIOR_PRECISION[axis];
-        }
+        self.precision += Matrix4::from_diagonal(&PRIOR_PRECISION.into());
         let covariance = self
             .precision
             .try_inverse()
@@ -124,7 +125,7 @@ impl Peak {
     /// Goes as much of `way` as improves the posterior.
     fn search_along(&mut self, way: Vector4<f64>, here: f64, history: &History) -> f64 {
         for share in [1.0, 0.4, 0.1] {
-            let (obstacle, evidence, value) = self.at(&(way * share), history);
+            let (obstacle, evidence, value) = self.try_at(&(way * share), history);
             if value > here {
                 self.obstacle = obstacle;
                 self.evidence = evidence;
@@ -137,13 +138,28 @@ impl Peak {
         0.0
     }
 
-    /// Obstacle, evidence and log posterior in the chart's measure at x.
-    fn at(&self, x: &Vector4<f64>, history: &History) -> (Obstacle, Evidence, f64) {
+    /// The obstacle at x in the peak's chart.
+    pub(super) fn at(&self, x: &Vector4<f64>, history: &History) -> Obstacle {
         let surface = history.skin.surface(self.obstacle.link as usize);
-        let mut obstacle = Obstacle {
+        Obstacle {
             core: self.chart.core(surface, x),
             ..self.obstacle
-        };
+        }
+    }
+
+    /// Number of coordinates that count.
+    pub(super) fn dimension(&self) -> usize {
+        self.chart.dimension()
+    }
+
+    /// The two directions along the surface, in the link's frame.
+    pub(super) fn sides(&self) -> Matrix3x2<f64> {
+        self.chart.sides()
+    }
+
+    /// Obstacle, evidence and log posterior in the chart's measure at x.
+    fn try_at(&self, x: &Vector4<f64>, history: &History) -> (Obstacle, Evidence, f64) {
+        let mut obstacle = self.at(x, history);
         let evidence = history.evidence(&mut obstacle);
         let value = evidence.log + log_radius_prior(self.chart.radius(x));
         (obstacle, evidence, value)
