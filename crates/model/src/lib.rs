@@ -4,23 +4,27 @@
 //! The model never changes after it is built; the results for one configuration are another value ([`Kinematics`]).
 //! Transforms are named `a_from_b`, quantities `x_in_a`; units are SI, angles radians, stamps integer nanoseconds.
 
+mod adjacency;
 mod clean;
 mod error;
 mod iiwa14;
 mod joint_map;
 mod kinematics;
 mod link_mesh;
+mod lists;
 mod load;
 mod mesh;
 mod mesh_file;
 mod mesh_source;
 mod pairing;
+mod rivals;
 mod robot;
 mod sample;
 mod shape;
 mod split;
 mod surface;
 mod tree;
+mod triangle;
 mod urdf;
 
 pub use clean::Cleaning;

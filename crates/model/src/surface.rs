@@ -1,12 +1,15 @@
 //! The surface of one link: closest points, by k-d tree and by walking downhill, and uniform samples.
 
+use std::num::NonZeroUsize;
+
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::TriangleMesh;
-
-/// Stands for "no triangle": the other side of a hole's border.
-const NONE: u32 = u32::MAX;
+use crate::adjacency::{Spoke, spokes_of, triangles_across_edges, triangles_around_vertices};
+use crate::lists::Lists;
+use crate::rivals::Rivals;
+use crate::triangle::{Feature, NONE, Triangle};
 
 /// A point on a triangle of a [`Surface`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,56 +23,58 @@ pub struct SurfacePoint {
 /// A link's mesh, prepared for the questions that the filter asks.
 pub struct Surface {
     triangles: Vec<Triangle>,
-    /// Triangles around each vertex: those of vertex v are `around[around_start[v]..around_start[v + 1]]`.
-    around_start: Vec<u32>,
-    around: Vec<u32>,
+    /// The edges that leave each vertex.
+    spokes: Lists<Spoke>,
+    rivals: Rivals,
     /// Area of the triangles up to and with each one, m².
     cumulative_area: Vec<f64>,
     centroids: ImmutableKdTree<f64, 3>,
 }
 
-/// One triangle with all that a projection touches, side by side in memory.
-#[derive(Clone, Debug)]
-struct Triangle {
-    corner: Point3<f64>,
-    edge_1: Vector3<f64>,
-    edge_2: Vector3<f64>,
-    normal: Unit<Vector3<f64>>,
-    vertices: [u32; 3],
-    /// The triangle across the edge from corner i to corner i + 1.
-    across: [u32; 3],
-}
-
-/// Where on a triangle its closest point lies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Feature {
-    Face,
-    Edge(usize),
-    Corner(usize),
+/// The point of one triangle closest to a query.
+struct Nearest {
+    triangle: u32,
+    point: Point3<f64>,
+    feature: Feature,
+    /// Squared distance from the query, m².
+    squared: f64,
 }
 
 impl Surface {
+    /// With so many triangles' centroids near a query a search begins: where triangles differ in size, or walls are
+    /// thin, the nearest centroid may be of the wrong one.
+    const SEEDS: NonZeroUsize = NonZeroUsize::new(4).unwrap();
+
     /// Prepares a mesh. None if it has no triangle.
     pub fn new(mesh: &TriangleMesh) -> Option<Self> {
         if mesh.triangles.is_empty() {
             return None;
         }
-        let (around_start, around) = triangles_around_vertices(mesh);
+        let around = triangles_around_vertices(mesh);
         let triangles: Vec<_> = (0..mesh.triangles.len())
-            .map(|index| Triangle::new(mesh, index, &around_start, &around))
+            .map(|index| {
+                let across = triangles_across_edges(mesh, &around, index);
+                Triangle::new(mesh.corners(index), mesh.triangles[index], across)
+            })
             .collect();
+        let mut spokes = Lists::default();
+        for vertex in 0..mesh.vertices.len() {
+            spokes.push(spokes_of(mesh, vertex as u32, around.get(vertex)));
+        }
         let mut total = 0.0;
         let cumulative_area = (triangles.iter())
             .map(|triangle| {
-                total += triangle.edge_1.cross(&triangle.edge_2).norm() / 2.0;
+                total += triangle.area();
                 total
             })
             .collect();
-        let centroids: Vec<[f64; 3]> = triangles.iter().map(Triangle::centroid).collect();
+        let centroids: Vec<[f64; 3]> = (triangles.iter())
+            .map(|triangle| triangle.centroid().coords.into())
+            .collect();
         Some(Self {
+            spokes,
+            rivals: Rivals::new(mesh, &triangles, &around),
             triangles,
-            around_start,
-            around,
             cumulative_area,
             centroids: ImmutableKdTree::new_from_slice(&centroids).ok()?,
         })
@@ -92,7 +97,7 @@ impl Surface {
 
     /// Centre of a triangle, m.
     pub fn centroid(&self, triangle: u32) -> Point3<f64> {
-        self.triangles[triangle as usize].centroid().into()
+        self.triangles[triangle as usize].centroid()
     }
 
     /// The triangles that share an edge with this one.
@@ -111,161 +116,110 @@ impl Surface {
         let root = uniform[1].sqrt();
         let (along_1, along_2) = (root * (1.0 - uniform[2]), root * uniform[2]);
         SurfacePoint {
-            point: triangle.corner + triangle.edge_1 * along_1 + triangle.edge_2 * along_2,
+            point: triangle.at(along_1, along_2),
             triangle: index as u32,
         }
     }
 
-    /// The surface point closest to `query`: the k-d tree gives the triangle with the nearest centroid, and a walk
-    /// downhill from there the closest point on triangles.
+    /// The surface point closest to `query`: walks as [`Surface::closest_point_from`] does, from the closest of the
+    /// triangles with the nearest centroids.
     pub fn closest_point(&self, query: &Point3<f64>) -> SurfacePoint {
-        let nearest = self
-            .centroids
-            .query(&[query.x, query.y, query.z])
-            .nearest_one::<SquaredEuclidean<f64>>()
+        let near = (self.centroids.query(&[query.x, query.y, query.z]))
+            .nearest_n::<SquaredEuclidean<f64>>(Self::SEEDS)
             .execute();
-        self.closest_point_from(query, nearest.item as u32)
+        let seeds = near.iter().map(|seed| seed.item);
+        match self.nearest_among(query, f64::INFINITY, seeds) {
+            Some(start) => self.walk(query, start),
+            None => self.closest_point_from(query, 0),
+        }
     }
 
-    /// The point closest to `query` that walking downhill from the triangle `start` finds. Exact where the surface
-    /// between `start` and the closest point has no other local minimum of the distance.
+    /// The point closest to `query` that a walk from the triangle `start` finds. It goes downhill, and also over the
+    /// ridges between neighbours, so that no triangle which shares a corner with the last one is closer. Exact unless
+    /// the surface has another local minimum of the distance farther away.
     pub fn closest_point_from(&self, query: &Point3<f64>, start: u32) -> SurfacePoint {
+        self.walk(query, self.nearest_on(query, start))
+    }
+
+    fn walk(&self, query: &Point3<f64>, start: Nearest) -> SurfacePoint {
         let mut current = start;
-        let (mut point, mut feature) = self.triangles[current as usize].closest_point(query);
-        let mut squared = (query - point).norm_squared();
         // Each step strictly shortens the distance, so no triangle comes twice and the walk ends.
         for _ in 0..self.triangles.len() {
-            let Some(step) = self.downhill(query, current, feature, squared) else {
+            let step = self.downhill(query, &current);
+            let Some(step) = step.or_else(|| self.over_a_ridge(query, &current)) else {
                 break;
             };
-            (current, point, feature, squared) = step;
+            current = step;
         }
         SurfacePoint {
-            point,
-            triangle: current,
+            point: current.point,
+            triangle: current.triangle,
         }
     }
 
-    /// The best neighbour across the feature that holds the closest point, if it is closer still. A closest point
-    /// inside a face is a local minimum of the distance: nothing else needs to be looked at.
-    fn downhill(
+    /// The best neighbour across the feature that holds the closest point, if it is closer still.
+    #[inline]
+    fn downhill(&self, query: &Point3<f64>, current: &Nearest) -> Option<Nearest> {
+        let triangle = &self.triangles[current.triangle as usize];
+        match current.feature {
+            Feature::Face => None,
+            Feature::Edge(edge) => {
+                self.nearest_among(query, current.squared, [triangle.across[edge]])
+            }
+            Feature::Corner(corner) => {
+                let away = query - current.point;
+                // Only edges that lead towards the query shorten the distance, and only triangles between such.
+                let spokes = self.spokes.get(triangle.vertices[corner] as usize).iter();
+                let towards = spokes.filter(|spoke| spoke.edge.dot(&away) > 0.0);
+                let neighbours = towards.flat_map(|spoke| spoke.triangles);
+                self.nearest_among(query, current.squared, neighbours)
+            }
+        }
+    }
+
+    /// The best of the triangles around a local minimum, if it is closer still.
+    #[inline]
+    fn over_a_ridge(&self, query: &Point3<f64>, current: &Nearest) -> Option<Nearest> {
+        let triangle = &self.triangles[current.triangle as usize];
+        let below = triangle.normal.dot(&(query - current.point)) < 0.0;
+        let depths = triangle.depths(&current.point);
+        let rivals = (self.rivals).of(current.triangle, below, depths, current.squared);
+        let in_reach = rivals.iter().copied().filter(|&rival| {
+            self.triangles[rival as usize].height(query).powi(2) < current.squared
+        });
+        self.nearest_among(query, current.squared, in_reach)
+    }
+
+    /// The closest of some triangles, if it is closer than a squared distance.
+    #[inline]
+    fn nearest_among(
         &self,
         query: &Point3<f64>,
-        current: u32,
-        feature: Feature,
         squared: f64,
-    ) -> Option<(u32, Point3<f64>, Feature, f64)> {
-        let triangle = &self.triangles[current as usize];
-        let neighbours = match feature {
-            Feature::Face => return None,
-            Feature::Edge(edge) => std::slice::from_ref(&triangle.across[edge]),
-            Feature::Corner(corner) => self.around(triangle.vertices[corner]),
-        };
+        triangles: impl IntoIterator<Item = u32>,
+    ) -> Option<Nearest> {
         let mut best = None;
         let mut least = squared * (1.0 - 1e-12) - 1e-24;
-        for &neighbour in neighbours {
-            if neighbour == current || neighbour == NONE {
-                continue;
-            }
-            let (point, feature) = self.triangles[neighbour as usize].closest_point(query);
-            let squared = (query - point).norm_squared();
-            if squared < least {
-                least = squared;
-                best = Some((neighbour, point, feature, squared));
+        for triangle in triangles.into_iter().filter(|&triangle| triangle != NONE) {
+            let nearest = self.nearest_on(query, triangle);
+            if nearest.squared < least {
+                least = nearest.squared;
+                best = Some(nearest);
             }
         }
         best
     }
 
-    fn around(&self, vertex: u32) -> &[u32] {
-        let vertex = vertex as usize;
-        &self.around[self.around_start[vertex] as usize..self.around_start[vertex + 1] as usize]
-    }
-}
-
-impl Triangle {
-    fn new(mesh: &TriangleMesh, index: usize, around_start: &[u32], around: &[u32]) -> Self {
-        let vertices = mesh.triangles[index];
-        let [a, b, c] = mesh.corners(index);
-        let across = [0, 1, 2].map(|edge| {
-            let (from, to) = (vertices[edge], vertices[(edge + 1) % 3]);
-            let range =
-                around_start[from as usize] as usize..around_start[from as usize + 1] as usize;
-            let shares = |&&other: &&u32| {
-                other as usize != index && mesh.triangles[other as usize].contains(&to)
-            };
-            around[range].iter().find(shares).copied().unwrap_or(NONE)
-        });
-        Self {
-            corner: a,
-            edge_1: b - a,
-            edge_2: c - a,
-            normal: Unit::new_normalize((b - a).cross(&(c - a))),
-            vertices,
-            across,
+    #[inline]
+    fn nearest_on(&self, query: &Point3<f64>, triangle: u32) -> Nearest {
+        let (point, feature) = self.triangles[triangle as usize].closest_point(query);
+        Nearest {
+            triangle,
+            point,
+            feature,
+            squared: (query - point).norm_squared(),
         }
     }
-
-    fn centroid(&self) -> [f64; 3] {
-        (self.corner + (self.edge_1 + self.edge_2) / 3.0)
-            .coords
-            .into()
-    }
-
-    /// Closest point by Voronoi regions (Ericson, Real-Time Collision Detection, 2005, section 5.1.5; its letters).
-    fn closest_point(&self, p: &Point3<f64>) -> (Point3<f64>, Feature) {
-        let (a, ab, ac) = (self.corner, &self.edge_1, &self.edge_2);
-        let ap = p - a;
-        let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
-        if d1 <= 0.0 && d2 <= 0.0 {
-            return (a, Feature::Corner(0));
-        }
-        let bp = ap - ab;
-        let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
-        if d3 >= 0.0 && d4 <= d3 {
-            return (a + ab, Feature::Corner(1));
-        }
-        let vc = d1 * d4 - d3 * d2;
-        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-            return (a + ab * (d1 / (d1 - d3)), Feature::Edge(0));
-        }
-        let cp = ap - ac;
-        let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
-        if d6 >= 0.0 && d5 <= d6 {
-            return (a + ac, Feature::Corner(2));
-        }
-        let vb = d5 * d2 - d1 * d6;
-        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-            return (a + ac * (d2 / (d2 - d6)), Feature::Edge(2));
-        }
-        let va = d3 * d6 - d5 * d4;
-        if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-            let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-            return (a + ab + (ac - ab) * w, Feature::Edge(1));
-        }
-        let scale = 1.0 / (va + vb + vc);
-        (a + ab * (vb * scale) + ac * (vc * scale), Feature::Face)
-    }
-}
-
-/// For each vertex the triangles that have it, as offsets into one list.
-fn triangles_around_vertices(mesh: &TriangleMesh) -> (Vec<u32>, Vec<u32>) {
-    let mut start = vec![0_u32; mesh.vertices.len() + 1];
-    for &vertex in mesh.triangles.iter().flatten() {
-        start[vertex as usize + 1] += 1;
-    }
-    for vertex in 0..mesh.vertices.len() {
-        start[vertex + 1] += start[vertex];
-    }
-    let mut next = start.clone();
-    let mut around = vec![0_u32; mesh.triangles.len() * 3];
-    for (index, triangle) in mesh.triangles.iter().enumerate() {
-        for &vertex in triangle {
-            around[next[vertex as usize] as usize] = index as u32;
-            next[vertex as usize] += 1;
-        }
-    }
-    (start, around)
 }
 
 #[cfg(test)]
@@ -333,18 +287,76 @@ mod tests {
         }
     }
 
-    /// Where the surface is concave, the triangle of the nearest centroid may belong to another minimum.
-    #[test]
-    fn closest_point_of_a_dented_ball_errs_little_and_seldom() {
-        let surface = Surface::new(&ball(0.03)).unwrap();
-        let excess = |index| {
-            let query = Point3::from(uniform(index).map(|u| (u - 0.5) * 0.5));
-            (surface.closest_point(&query).point - query).norm() - brute_force(&surface, &query)
+    /// All triangles that share a corner with this one.
+    fn ring(surface: &Surface, triangle: u32) -> Vec<u32> {
+        let vertices = surface.triangles[triangle as usize].vertices;
+        let touches = |&other: &u32| {
+            let others = surface.triangles[other as usize].vertices;
+            others.iter().any(|vertex| vertices.contains(vertex))
         };
-        let excesses: Vec<f64> = (0..4000).map(excess).collect();
-        let wrong = excesses.iter().filter(|&&excess| excess > 1e-12).count();
-        assert!(wrong < 40, "{wrong} of 4000 not exact");
-        assert!(excesses.iter().all(|&excess| excess < 2e-3));
+        (0..surface.triangle_count() as u32)
+            .filter(touches)
+            .collect()
+    }
+
+    #[test]
+    fn closest_point_of_a_dented_ball_equals_brute_force() {
+        let surface = Surface::new(&ball(0.03)).unwrap();
+        for index in 0..4000 {
+            let query = Point3::from(uniform(index).map(|u| (u - 0.5) * 0.5));
+            let found = (surface.closest_point(&query).point - query).norm();
+            let exact = brute_force(&surface, &query);
+            assert!(found - exact < 1e-12, "{query}: {found}, exact {exact}");
+        }
+    }
+
+    /// Where a surface bends towards the query, many triangles hold a local minimum of the distance inside: here the
+    /// ball's wall, seen from a third of the way to its middle.
+    #[test]
+    fn a_walk_leaves_local_minima_beside_the_closest_point() {
+        let surface = Surface::new(&ball(0.0)).unwrap();
+        let mut traps = 0;
+        for index in 0..200 {
+            let on_wall = surface.sample(uniform(index));
+            let query = on_wall.point * 0.6;
+            let exact = brute_force(&surface, &query);
+            let end = surface.closest_point_from(&query, on_wall.triangle);
+            for start in ring(&surface, end.triangle) {
+                let (point, feature) = surface.triangles[start as usize].closest_point(&query);
+                let is_trap = feature == Feature::Face && (point - query).norm() > exact + 1e-9;
+                traps += u32::from(is_trap);
+                let found = (surface.closest_point_from(&query, start).point - query).norm();
+                assert!(found - exact < 1e-12, "{query} from {start}");
+            }
+        }
+        assert!(traps > 50, "only {traps} starts were traps");
+    }
+
+    #[test]
+    fn no_triangle_around_the_answer_is_closer() {
+        let surface = Surface::new(&ball(0.03)).unwrap();
+        for index in 0..300 {
+            let query = Point3::from(uniform(index).map(|u| (u - 0.5) * 0.3));
+            let start = index * 6 % surface.triangle_count() as u32;
+            let found = surface.closest_point_from(&query, start);
+            let distance = (found.point - query).norm();
+            for other in ring(&surface, found.triangle) {
+                let other = surface.triangles[other as usize].closest_point(&query).0;
+                assert!((other - query).norm() > distance - 1e-12, "{query}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_convex_surface_has_no_rivals_outside_and_a_dented_one_few() {
+        let rivals = |surface: &Surface| {
+            let above = |&t: &u32| !surface.rivals.of(t, false, [0.0; 3], 1.0).is_empty();
+            (0..surface.triangle_count() as u32).filter(above).count()
+        };
+        assert_eq!(rivals(&Surface::new(&ball(0.0)).unwrap()), 0);
+        let dented = Surface::new(&ball(0.03)).unwrap();
+        let (some, all) = (rivals(&dented), dented.triangle_count());
+        assert!((1..all / 2).contains(&some), "{some} of {all}");
     }
 
     #[test]
@@ -382,12 +394,12 @@ mod tests {
             .filter(|&i| surface.sample(uniform(i)).point.z > 0.05)
             .count();
         let area_above = |z: f64| -> f64 {
-            let above = |t: &&Triangle| t.centroid()[2] > z;
+            let above = |t: &&Triangle| t.centroid().z > z;
             surface
                 .triangles
                 .iter()
                 .filter(above)
-                .map(|t| t.edge_1.cross(&t.edge_2).norm() / 2.0)
+                .map(Triangle::area)
                 .sum()
         };
         let expected = area_above(0.05) / surface.area();

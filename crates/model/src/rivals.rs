@@ -1,0 +1,109 @@
+//! Which triangles may be closer to a point than one of their neighbours that is a local minimum of the distance.
+//!
+//! Where a surface bends towards a point, the faces on both sides of a crease are local minima, and walking downhill may
+//! end on the wrong one. Where that can be is known beforehand. Let d be the distance of the point from a triangle and
+//! s the depth of the closest point inside of an edge. What rises from the line of that edge, at most at the angle φ to
+//! the triangle's plane, stays out of the ball of radius d about the point if s ≥ d tan(φ / 2): then a wall that leans at
+//! φ just touches the ball.
+
+use crate::TriangleMesh;
+use crate::lists::Lists;
+use crate::triangle::Triangle;
+
+/// A triangle rises above another one's plane if by more than this, m.
+const LEAST_RISE: f64 = 1e-9;
+
+/// For each triangle, which of those that share a corner with it rise above it and which fall below it.
+pub(crate) struct Rivals {
+    /// Greatest tan(φ / 2) beyond each edge, in the units of [`Triangle::depths`]; upwards for triangle t at 2 t,
+    /// downwards at 2 t + 1.
+    steepest: Vec<[f64; 3]>,
+    /// Those that rise so, in the same order.
+    triangles: Lists<u32>,
+}
+
+impl Rivals {
+    /// For the triangles of a mesh, given those around each vertex.
+    pub(crate) fn new(mesh: &TriangleMesh, triangles: &[Triangle], around: &Lists<u32>) -> Self {
+        let mut steepest = Vec::with_capacity(2 * triangles.len());
+        let mut rising = Lists::default();
+        let mut ring = Vec::new();
+        for triangle in triangles {
+            ring.clear();
+            for vertex in triangle.vertices {
+                ring.extend_from_slice(around.get(vertex as usize));
+            }
+            ring.sort_unstable();
+            ring.dedup();
+            let units = triangle.depth_units();
+            for side in [1.0, -1.0] {
+                let mut steepest_here = [0.0_f64; 3];
+                rising.push(ring.iter().copied().filter(|&other| {
+                    let other = mesh.triangles[other as usize];
+                    let Some((edge, steepness)) = rise(mesh, triangle, &units, other, side) else {
+                        return false;
+                    };
+                    steepest_here[edge] = steepest_here[edge].max(steepness * units[edge]);
+                    true
+                }));
+                steepest.push(steepest_here);
+            }
+        }
+        Self {
+            steepest,
+            triangles: rising,
+        }
+    }
+
+    /// Those around `triangle` (number `index`) that may come closer than `depths` inside of its edges do, to a point
+    /// above or below it at this squared distance. None where the surface bends away from the point.
+    #[inline]
+    pub(crate) fn of(&self, index: u32, below: bool, depths: [f64; 3], squared: f64) -> &[u32] {
+        let index = 2 * index as usize + usize::from(below);
+        let steepest = &self.steepest[index];
+        let reached = |edge: usize| {
+            // Rounding may put a point of an edge outside of it.
+            depths[edge].max(0.0).powi(2) < squared * steepest[edge].powi(2)
+        };
+        // Without branches between them: which edge it is cannot be predicted.
+        match reached(0) | reached(1) | reached(2) {
+            true => self.triangles.get(index),
+            false => &[],
+        }
+    }
+}
+
+/// Beyond which edge of `triangle` another one rises, and tan(φ / 2) for it. Where it only shares a corner, two edges
+/// would do; the one for which it is less steep tells more.
+fn rise(
+    mesh: &TriangleMesh,
+    triangle: &Triangle,
+    units: &[f64; 3],
+    other: [u32; 3],
+    side: f64,
+) -> Option<(usize, f64)> {
+    let shares = |corner: usize| other.contains(&triangle.vertices[corner % 3]);
+    let mut steepness: [Option<f64>; 3] = [None; 3];
+    for vertex in other
+        .iter()
+        .filter(|vertex| !triangle.vertices.contains(vertex))
+    {
+        let vertex = &mesh.vertices[*vertex as usize];
+        let height = side * triangle.height(vertex);
+        if height <= LEAST_RISE {
+            continue;
+        }
+        let depths = triangle.depths(vertex);
+        for edge in 0..3 {
+            // The formula is for what starts on the line of the edge.
+            if !shares(edge + 2) || (shares(edge) && shares(edge + 1)) {
+                let beyond = -depths[edge] / units[edge];
+                let tangent = height / (beyond + beyond.hypot(height));
+                steepness[edge] = Some(steepness[edge].map_or(tangent, |most| most.max(tangent)));
+            }
+        }
+    }
+    (0..3)
+        .filter_map(|edge| Some((edge, steepness[edge]?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+}
