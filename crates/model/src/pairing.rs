@@ -9,7 +9,8 @@ use crate::JointSample;
 pub struct PairingLosses {
     /// Torques for which no position came close enough in time.
     pub torque_without_position: u64,
-    /// Positions that no torque asked for.
+    /// Positions that fell out while they waited for torques, which stopped or lag far behind. Positions between two
+    /// torques are no loss: they may come at a higher rate.
     pub position_without_torque: u64,
 }
 
@@ -175,6 +176,28 @@ mod tests {
         pairing.push_torque(97, vec![4.0]);
         assert_eq!(drain(&mut pairing), [(97, 2.0, 4.0)]);
         assert_eq!(pairing.losses().torque_without_position, 1);
+    }
+
+    #[test]
+    fn positions_between_torques_are_no_loss_but_positions_without_any_are() {
+        let mut pairing = Pairing::new(5);
+        for stamp in 0..2000 {
+            pairing.push_position(stamp, vec![0.0]);
+            if stamp % 10 == 0 {
+                pairing.push_torque(stamp, vec![0.0]);
+                assert_eq!(drain(&mut pairing).len(), 1);
+            }
+        }
+        assert_eq!(pairing.losses(), PairingLosses::default());
+        for stamp in 2000..2500 {
+            pairing.push_position(stamp, vec![0.0]);
+        }
+        // The position of the last torque, 1990, is the oldest that waits.
+        let expected = PairingLosses {
+            position_without_torque: 510 - 256,
+            ..PairingLosses::default()
+        };
+        assert_eq!(pairing.losses(), expected);
     }
 
     #[test]
