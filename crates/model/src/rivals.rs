@@ -107,3 +107,39 @@ fn rise(
         .filter_map(|edge| Some((edge, steepness[edge]?)))
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, Vector3};
+
+    use crate::{Surface, TriangleMesh};
+
+    /// Two walls, 1 m deep, that meet along the y axis and rise at the given angle on both sides.
+    fn valley(lean: f64) -> TriangleMesh {
+        let (sin, cos) = lean.sin_cos();
+        let vertices = [-1.0, 0.0, 1.0]
+            .map(|x: f64| [-1.0, 1.0].map(|y| Point3::new(x * cos, y, x.abs() * sin)));
+        TriangleMesh {
+            vertices: vertices.concat(),
+            triangles: vec![[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]],
+        }
+    }
+
+    /// Both walls are as close to points above the crease; a little aside one of them is closer.
+    #[test]
+    fn the_other_wall_of_a_valley_is_found_as_soon_as_it_is_closer() {
+        for lean in [0.02, 0.3, 1.0, 1.4] {
+            let surface = Surface::new(&valley(lean)).unwrap();
+            for (x, start) in [(-1e-6, 2), (-1e-6, 3), (1e-6, 0), (1e-6, 1)] {
+                let query = Point3::new(x, 0.1, 0.2);
+                let found = surface.closest_point_from(&query, start).point;
+                let towards_wall = Vector3::new(lean.sin() * x.signum(), 0.0, -lean.cos());
+                let expected = query + towards_wall * (0.2 * lean.cos() + x.abs() * lean.sin());
+                assert!(
+                    (found - expected).norm() < 1e-5,
+                    "{lean} {x} {start}: {found}"
+                );
+            }
+        }
+    }
+}
