@@ -8,9 +8,9 @@ use crate::ParameterError;
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct DetectorParameters {
-    /// Contact begins when the smoothed torque of some joint exceeds this, Nm. Default 0.8.
+    /// Contact begins when the smoothed torque of some joint exceeds this, Nm. Default 0.3.
     pub on_torque: f64,
-    /// Contact ends when the smoothed torque of every joint is below this, Nm. Default 0.4.
+    /// Contact ends when the smoothed torque of every joint is below this, Nm. Default 0.2.
     pub off_torque: f64,
     /// Time constant of the smoothing, s. Default 0.02.
     pub smoothing_secs: f64,
@@ -21,8 +21,8 @@ pub struct DetectorParameters {
 impl Default for DetectorParameters {
     fn default() -> Self {
         Self {
-            on_torque: 0.8,
-            off_torque: 0.4,
+            on_torque: 0.3,
+            off_torque: 0.2,
             smoothing_secs: 0.02,
             release_secs: 0.2,
         }
@@ -134,10 +134,10 @@ mod tests {
     #[test]
     fn contact_begins_above_one_threshold_and_ends_below_another() {
         let mut detector = Detector::new(DetectorParameters::default(), 2);
-        assert!(!run(&mut detector, 0, 500, 0.7));
-        assert!(run(&mut detector, 500, 1000, -0.9));
+        assert!(!run(&mut detector, 0, 500, 0.25));
+        assert!(run(&mut detector, 500, 1000, -0.4));
         assert!(
-            run(&mut detector, 1000, 2000, 0.5),
+            run(&mut detector, 1000, 2000, 0.25),
             "between the thresholds it stays"
         );
         assert!(

@@ -5,7 +5,7 @@ use palpate_model::{Kinematics, Robot};
 
 use crate::detector::Detector;
 use crate::modes::ModeFinder;
-use crate::palpate::PalpateFilter;
+use crate::palpate::{MOST_JOINTS, PalpateFilter};
 use crate::paper::PaperFilter;
 use crate::skin::Skin;
 use crate::step::Step;
@@ -35,10 +35,10 @@ impl Estimator {
         }
     }
 
-    fn begin(&mut self, skin: &Skin, number: u64, stamp_ns: i64, count: usize) {
+    fn begin(&mut self, skin: &Skin, number: u64, count: usize) {
         match self {
             Self::Paper(filter) => filter.begin(skin, number, count),
-            Self::Palpate(filter) => filter.begin(stamp_ns),
+            Self::Palpate(filter) => filter.begin(),
         }
     }
 
@@ -90,6 +90,7 @@ impl Filter {
             robot: robot.name.clone(),
         };
         let skin = Skin::new(robot).ok_or_else(nothing)?;
+        check_paths(robot)?;
         let count = parameters.particles;
         Ok(Self {
             detector: Detector::new(parameters.detector.clone(), robot.dof()),
@@ -127,8 +128,7 @@ impl Filter {
                 self.before.clone_from(&self.now);
                 self.position_before.copy_from_slice(&sample.position);
                 let count = self.parameters.particles;
-                self.estimator
-                    .begin(&self.skin, self.number, sample.stamp_ns, count);
+                self.estimator.begin(&self.skin, self.number, count);
             }
             let step = Step {
                 robot: &self.robot,
@@ -190,5 +190,20 @@ impl Filter {
         self.cloud.clear();
         self.estimate.status = ContactStatus::NoContact;
         self.estimate.modes.clear();
+    }
+}
+
+fn check_paths(robot: &Robot) -> Result<(), ParameterError> {
+    match robot
+        .links
+        .iter()
+        .find(|link| link.path.len() > MOST_JOINTS)
+    {
+        None => Ok(()),
+        Some(link) => Err(ParameterError::TooManyJoints {
+            link: link.name.clone(),
+            most: MOST_JOINTS,
+            found: link.path.len(),
+        }),
     }
 }

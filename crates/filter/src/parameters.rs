@@ -105,6 +105,18 @@ pub enum ParameterError {
         /// What was found.
         found: String,
     },
+    /// More joints act on a link than the filter has room for.
+    #[error(
+        "link {link} has {found} movable joints on its path to the root, expected at most {most}"
+    )]
+    TooManyJoints {
+        /// The link.
+        link: String,
+        /// How many joints there may be.
+        most: usize,
+        /// How many there are.
+        found: usize,
+    },
     /// The robot has nothing to touch.
     #[error(
         "robot {robot} has no link with both a mesh and a movable joint on its path: nothing can be located"

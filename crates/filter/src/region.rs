@@ -144,8 +144,8 @@ mod tests {
     fn far_modes_share_the_region_and_faint_ones_have_none() {
         let modes = [
             mode(0.0, 0.01, 0.6),
-            mode(1.0, 0.01, 0.38),
-            mode(2.0, 0.01, 0.02),
+            mode(1.0, 0.01, 0.395),
+            mode(2.0, 0.01, 0.005),
         ];
         let region = CredibleRegion::new(&modes, 0.9);
         assert!(radius(&region, 0.0) > radius(&region, 1.0));

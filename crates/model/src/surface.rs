@@ -90,6 +90,13 @@ impl Surface {
         self.cumulative_area.last().copied().unwrap_or(0.0)
     }
 
+    /// Area of a triangle, m².
+    pub fn triangle_area(&self, triangle: u32) -> f64 {
+        let index = triangle as usize;
+        let before = if index == 0 { 0.0 } else { self.cumulative_area[index - 1] };
+        self.cumulative_area[index] - before
+    }
+
     /// Outward normal of a triangle.
     pub fn normal(&self, triangle: u32) -> Unit<Vector3<f64>> {
         self.triangles[triangle as usize].normal

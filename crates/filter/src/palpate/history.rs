@@ -80,4 +80,18 @@ impl History<'_> {
             core: core.moved(&root_from_link),
         }
     }
+
+    /// The same contact with the same radius, but as a ball, or as a bar at an angle `turn` about the normal.
+    pub(super) fn reshaped(&self, obstacle: &Obstacle, turn: Option<f64>) -> Obstacle {
+        let touch = self.newest_touch(obstacle);
+        let (link, radius) = (obstacle.link as usize, touch.distance);
+        self.obstacle_on(
+            link,
+            touch.triangle,
+            &touch.point,
+            &touch.normal,
+            radius,
+            turn,
+        )
+    }
 }

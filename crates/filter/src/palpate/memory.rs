@@ -15,8 +15,6 @@ pub(super) struct Keyframe {
     pub(super) samples: f64,
     /// Time between first and last sample, with one sample's length, s.
     pub(super) length_secs: f64,
-    /// Mean stamp relative to the contact's begin, s.
-    pub(super) time_secs: f64,
     /// Mean joint positions, rad.
     pub(super) position: Vec<f64>,
     /// Mean joint velocities, rad/s.
@@ -60,7 +58,6 @@ impl Keyframe {
         blend(&mut self.position, &other.position);
         blend(&mut self.velocity, &other.velocity);
         blend(&mut self.torque, &other.torque);
-        self.time_secs += share * (other.time_secs - self.time_secs);
         self.samples += other.samples;
         self.length_secs += other.length_secs;
     }
@@ -71,7 +68,7 @@ impl Keyframe {
 struct Filling {
     samples: f64,
     first_ns: i64,
-    last_ns: i64,
+    last_ns: Option<i64>,
     first_position: Vec<f64>,
     last_position: Vec<f64>,
     position: Vec<f64>,
@@ -83,7 +80,6 @@ pub(super) struct Memory {
     pub(super) keyframes: Vec<Keyframe>,
     filling: Filling,
     kinematics: Kinematics,
-    begin_ns: i64,
     committed: usize,
     /// Typical time between samples, s.
     period_secs: f64,
@@ -95,70 +91,66 @@ impl Memory {
             keyframes: Vec::with_capacity(MOST + 1),
             filling: Filling::default(),
             kinematics: Kinematics::new(robot),
-            begin_ns: 0,
             committed: 0,
             period_secs: 0.01,
         }
     }
 
-    pub(super) fn begin(&mut self, stamp_ns: i64) {
+    /// Forgets the last contact.
+    pub(super) fn begin(&mut self) {
         self.keyframes.clear();
         self.filling.samples = 0.0;
-        self.begin_ns = stamp_ns;
+        self.filling.last_ns = None;
         self.committed = 0;
     }
 
-    /// Takes a sample in. Tells whether that completed a keyframe, which is then the last of `keyframes`.
-    pub(super) fn push(
-        &mut self,
-        robot: &Robot,
-        stamp_ns: i64,
-        position: &[f64],
-        torque: &[f64],
-    ) -> bool {
+    /// Takes a sample in.
+    pub(super) fn push(&mut self, stamp_ns: i64, position: &[f64], torque: &[f64]) {
         let filling = &mut self.filling;
+        if let Some(last_ns) = filling.last_ns {
+            let period = (stamp_ns - last_ns) as f64 * 1e-9;
+            // A gap is not the rate.
+            self.period_secs += 0.05 * (period.min(0.2) - self.period_secs);
+        }
         if filling.samples == 0.0 {
-            filling.first_ns = if self.committed > 0 {
-                filling.last_ns
-            } else {
-                stamp_ns
-            };
-            if self.committed == 0 {
-                filling.last_position = position.to_vec();
+            filling.first_ns = filling.last_ns.unwrap_or(stamp_ns);
+            if filling.last_ns.is_none() {
+                filling.last_position.clear();
+                filling.last_position.extend(position);
             }
             filling.first_position.clone_from(&filling.last_position);
-            filling.position.clear();
-            filling.position.resize(position.len(), 0.0);
-            filling.torque.clear();
-            filling.torque.resize(torque.len(), 0.0);
-        }
-        if filling.last_ns > 0 && (self.committed > 0 || filling.samples > 0.0) {
-            let period = (stamp_ns - filling.last_ns) as f64 * 1e-9;
-            if period < 0.2 {
-                self.period_secs += 0.05 * (period - self.period_secs);
-            }
+            refill(&mut filling.position, position.len());
+            refill(&mut filling.torque, torque.len());
         }
         filling.samples += 1.0;
-        filling.last_ns = stamp_ns;
+        filling.last_ns = Some(stamp_ns);
         filling.last_position.copy_from_slice(position);
-        for (sum, value) in filling.position.iter_mut().zip(position) {
-            *sum += value;
-        }
-        for (sum, value) in filling.torque.iter_mut().zip(torque) {
-            *sum += value;
-        }
-        let wanted = LENGTHS_SECS[self.committed.min(LENGTHS_SECS.len() - 1)];
-        let length = filling.samples * self.period_secs;
-        if length < wanted - 1e-4 {
-            return false;
-        }
-        self.commit(robot);
-        true
+        add(&mut filling.position, position);
+        add(&mut filling.torque, torque);
     }
 
-    fn commit(&mut self, robot: &Robot) {
+    /// Whether the samples taken in are enough for a keyframe.
+    pub(super) fn is_complete(&self) -> bool {
+        let wanted = LENGTHS_SECS[self.committed.min(LENGTHS_SECS.len() - 1)];
+        self.filling.samples * self.period_secs > wanted - 1e-4
+    }
+
+    /// Typical time between samples, s.
+    pub(super) fn period_secs(&self) -> f64 {
+        self.period_secs
+    }
+
+    /// Forgets all but the last keyframes.
+    pub(super) fn keep_last(&mut self, count: usize) {
+        let drop = self.keyframes.len().saturating_sub(count);
+        self.keyframes.drain(..drop);
+    }
+
+    /// Makes the samples taken in a keyframe, the last of `keyframes`.
+    pub(super) fn commit(&mut self, robot: &Robot) {
         let filling = &mut self.filling;
-        let span = ((filling.last_ns - filling.first_ns) as f64 * 1e-9).max(self.period_secs);
+        let last_ns = filling.last_ns.unwrap_or(filling.first_ns);
+        let span = ((last_ns - filling.first_ns) as f64 * 1e-9).max(self.period_secs);
         let mean = |sums: &[f64]| {
             sums.iter()
                 .map(|sum| sum / filling.samples)
@@ -167,11 +159,9 @@ impl Memory {
         let velocity = (filling.last_position.iter().zip(&filling.first_position))
             .map(|(last, first)| (last - first) / span)
             .collect();
-        let middle = (filling.last_ns - self.begin_ns) as f64 * 1e-9 - span / 2.0;
         let mut keyframe = Keyframe {
             samples: filling.samples,
             length_secs: filling.samples * self.period_secs,
-            time_secs: middle,
             position: mean(&filling.position),
             velocity,
             torque: mean(&filling.torque),
@@ -212,5 +202,16 @@ impl Memory {
             self.keyframes[index].absorb(&absorbed);
             self.keyframes[index].refresh(robot, &mut self.kinematics);
         }
+    }
+}
+
+fn refill(sums: &mut Vec<f64>, length: usize) {
+    sums.clear();
+    sums.resize(length, 0.0);
+}
+
+fn add(sums: &mut [f64], values: &[f64]) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += value;
     }
 }

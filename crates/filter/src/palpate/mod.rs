@@ -3,8 +3,10 @@
 //! A particle is an obstacle that rests in the world ([`obstacle`]); its weight is the evidence of the contact's whole
 //! history ([`memory`], [`evidence`]), with force, stiffness, friction and bias solved and the noise learned
 //! ([`noise`]). Peaks of the evidence are found by asking every triangle ([`scan`]) and climbing ([`peaks`]); Markov
-//! chain moves ([`moves`]) carry the particles between and around them, so that a wrong mode is left again.
+//! chain moves ([`moves`]) carry the particles between and around them, so that a wrong mode is left again. The work
+//! that a keyframe causes is spread over the samples until the next ([`agenda`]).
 
+mod agenda;
 mod chart;
 mod evidence;
 mod history;
@@ -17,6 +19,7 @@ mod peaks;
 mod scan;
 mod sight;
 
+use nalgebra::Matrix3;
 use palpate_model::Robot;
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
@@ -26,28 +29,32 @@ use crate::resample::{effective_sample_size, normalise, systematic};
 use crate::step::Step;
 use crate::{Mode, Particle};
 
+use agenda::{Agenda, Phase};
 use evidence::Evidence;
 pub(crate) use evidence::MOST_JOINTS;
 use history::History;
 use memory::Memory;
 use moves::Proposals;
-use nalgebra::Matrix3;
 use noise::Noise;
 use obstacle::Obstacle;
 pub use parameters::PalpateParameters;
 use peaks::Peak;
+use scan::Candidate;
 
-/// Particles that share one random stream and one unit of parallel work.
-const CHUNK: usize = 32;
 /// Draws for each particle at the start.
 const FIRST_DRAWS: usize = 8;
-
-/// Climbs from new places at each keyframe, from the best peaks first, and the steps of each.
-const HOPS: usize = 6;
+/// Climbs from new places at each keyframe, the first of them from beside the best peaks, and the steps of each.
+const HOPS: usize = 8;
+const HOPS_FROM_PEAKS: usize = 5;
 const HOP_CLIMB: usize = 3;
-
+/// Evaluations that one Newton step takes.
+const STEP_COST: usize = 14;
 /// Variance of a contact's place on a link without a peak, m².
 const UNSEEN: f64 = 0.01;
+/// A keyframe whose mean squared normalised residual exceeds this does not belong to the contact as it was known; so
+/// many in a row are a new contact.
+const MISFIT: f64 = 16.0;
+const MISFITS: usize = 3;
 
 /// One particle: an obstacle and what the history says of it.
 #[derive(Clone, Copy, Debug)]
@@ -67,8 +74,17 @@ pub(crate) struct PalpateFilter {
     particles: Vec<Hypothesis>,
     weights: Vec<f64>,
     peaks: Vec<Peak>,
-    /// Keyframes since the contact began.
+    agenda: Agenda,
+    /// What the present phase has made so far, to take effect when it is complete.
+    renewed: Vec<Hypothesis>,
+    found: Vec<Peak>,
+    candidates: Vec<Candidate>,
+    others: Vec<Hypothesis>,
+    /// Number of the sample that completed the newest keyframe: keys the random streams.
+    key: u64,
+    /// Keyframes since the contact began, and how many of the last ones did not fit.
     keyframes: usize,
+    misfits: usize,
 }
 
 impl PalpateFilter {
@@ -81,88 +97,213 @@ impl PalpateFilter {
             particles: Vec::new(),
             weights: Vec::new(),
             peaks: Vec::new(),
+            agenda: Agenda::new(),
+            renewed: Vec::new(),
+            found: Vec::new(),
+            candidates: Vec::new(),
+            others: Vec::new(),
+            key: 0,
             keyframes: 0,
+            misfits: 0,
         }
     }
 
     /// Forgets the last contact.
-    pub(crate) fn begin(&mut self, stamp_ns: i64) {
-        self.memory.begin(stamp_ns);
+    pub(crate) fn begin(&mut self) {
+        self.memory.begin();
         self.noise.begin();
+        self.forget_places();
+    }
+
+    fn forget_places(&mut self) {
         self.particles.clear();
         self.peaks.clear();
+        self.agenda.enter(Phase::Idle);
         self.keyframes = 0;
+        self.misfits = 0;
     }
 
-    /// One step: remember; at each completed keyframe calibrate, reweigh, resample, look for peaks, move.
+    /// One step: remember; when the last keyframe's work is done and the next complete, take that in; work.
     pub(crate) fn step(&mut self, step: &Step, stamp_ns: i64) {
         self.noise.learn(step.torque);
-        if !self
-            .memory
-            .push(step.robot, stamp_ns, step.position, step.torque)
-        {
-            return;
+        self.memory.push(stamp_ns, step.position, step.torque);
+        if self.agenda.phase == Phase::Idle && self.memory.is_complete() {
+            self.memory.commit(step.robot);
+            self.take_in_keyframe(step);
         }
-        self.keyframes += 1;
-        self.calibrate(step);
-        self.noise.sum(&self.memory.keyframes);
-        if self.particles.is_empty() {
-            self.spread(step);
-        } else {
-            self.reweigh(step);
-        }
-        self.resample(step);
-        self.seek_peaks(step);
-        for round in 0..self.parameters.rounds {
-            self.mutate(step, round);
+        self.agenda.pay(self.memory.period_secs());
+        while self.agenda.goes_on() {
+            self.work(step);
         }
     }
 
-    /// Learns from the best hypothesis' residuals how much larger they are than the noise model says.
-    fn calibrate(&mut self, step: &Step) {
-        let peak = self.peaks.iter().map(|peak| (peak.obstacle, peak.evidence));
-        let particle = self
+    /// Judges and calibrates by the new keyframe, and puts the work that it causes on the agenda.
+    fn take_in_keyframe(&mut self, step: &Step) {
+        self.key = step.number;
+        self.keyframes += 1;
+        self.noise.sum(&self.memory.keyframes);
+        if let Some((obstacle, evidence)) = self.best() {
+            let history = history(step, &self.memory, &self.noise);
+            if self.noise.misfit(&obstacle, &evidence, &history) > MISFIT {
+                self.misfits += 1;
+            } else {
+                self.misfits = 0;
+                let inflation = self.noise.calibrated(&obstacle, &evidence, &history);
+                self.noise.inflate(inflation);
+            }
+        }
+        if self.misfits >= MISFITS {
+            self.memory.keep_last(MISFITS);
+            self.noise.begin();
+            self.forget_places();
+            self.keyframes = 1;
+        }
+        self.noise.sum(&self.memory.keyframes);
+        self.agenda.enter(if self.particles.is_empty() {
+            Phase::Spread
+        } else {
+            Phase::Reweigh
+        });
+    }
+
+    /// The hypothesis with the largest evidence.
+    fn best(&self) -> Option<(Obstacle, Evidence)> {
+        let peaks = self.peaks.iter().map(|peak| (peak.obstacle, peak.evidence));
+        let particles = self
             .particles
             .iter()
             .map(|particle| (particle.obstacle, particle.evidence));
-        let best = peak
-            .chain(particle)
-            .max_by(|a, b| a.1.log.total_cmp(&b.1.log));
-        if let Some((obstacle, evidence)) = best {
-            let history = history(step, &self.memory, &self.noise);
-            let inflation = self.noise.calibrated(&obstacle, &evidence, &history);
-            self.noise.inflate(inflation);
+        peaks
+            .chain(particles)
+            .max_by(|a, b| a.1.log.total_cmp(&b.1.log))
+    }
+
+    /// Does a portion of the present phase, and what completes it if that was the last.
+    fn work(&mut self, step: &Step) {
+        let history = history(step, &self.memory, &self.noise);
+        let looks = self.memory.keyframes.len();
+        let count = self.particles.len();
+        let (seed, key) = (self.seed, self.key);
+        match self.agenda.phase {
+            Phase::Idle => {}
+            Phase::Spread => {
+                let total = self.parameters.hypotheses * FIRST_DRAWS;
+                let portion = self.agenda.take(total, looks);
+                let draw = |index| draw(&history, &mut stream(seed, key, index, Purpose::Spread));
+                self.renewed.par_extend(portion.into_par_iter().map(draw));
+                if self.agenda.done == total {
+                    self.particles = std::mem::take(&mut self.renewed);
+                    self.resample();
+                    self.agenda.enter(Phase::Climb);
+                }
+            }
+            Phase::Reweigh => {
+                let portion = self.agenda.take(count, looks);
+                let particles = &self.particles[portion];
+                self.renewed.par_extend(
+                    particles
+                        .par_iter()
+                        .map(|particle| reweighed(particle, &history)),
+                );
+                if self.agenda.done == count {
+                    std::mem::swap(&mut self.particles, &mut self.renewed);
+                    self.renewed.clear();
+                    self.resample();
+                    self.agenda.enter(Phase::Climb);
+                }
+            }
+            Phase::Climb => {
+                let total = self.peaks.len();
+                let portion = self.agenda.take(total, looks * STEP_COST);
+                self.peaks[portion]
+                    .par_iter_mut()
+                    .for_each(|peak| peak.climb(&history, 1));
+                if self.agenda.done == total {
+                    self.agenda.enter(Phase::Hop);
+                }
+            }
+            Phase::Hop => {
+                let portion = self.agenda.take(HOPS, looks * STEP_COST * HOP_CLIMB);
+                let hops: Vec<Peak> = portion
+                    .into_par_iter()
+                    .map(|index| self.hop(index, &history))
+                    .collect();
+                self.found.extend(hops);
+                if self.agenda.done == HOPS {
+                    self.candidates.clear();
+                    if scan::is_due(self.keyframes) {
+                        self.candidates = scan::candidates(&history, seed, key);
+                    }
+                    self.agenda.enter(Phase::Scan);
+                }
+            }
+            Phase::Scan => {
+                let total = self.candidates.len();
+                let portion = self.agenda.take(total, looks * STEP_COST * scan::CLIMB);
+                let candidates = &self.candidates[portion];
+                self.found.par_extend(
+                    candidates
+                        .par_iter()
+                        .map(|candidate| scan::climb_ball(&history, candidate)),
+                );
+                if self.agenda.done == total {
+                    self.peaks.append(&mut self.found);
+                    peaks::keep_best(&mut self.peaks);
+                    self.agenda.enter(Phase::Bars);
+                }
+            }
+            Phase::Bars => {
+                let total = if self.candidates.is_empty() {
+                    0
+                } else {
+                    scan::BARS.min(self.peaks.len())
+                };
+                let portion = self.agenda.take(total, looks * STEP_COST * scan::CLIMB);
+                let balls = &self.peaks[portion];
+                self.found
+                    .par_extend(balls.par_iter().map(|ball| scan::climb_bar(&history, ball)));
+                if self.agenda.done == total {
+                    self.peaks.append(&mut self.found);
+                    peaks::keep_best(&mut self.peaks);
+                    self.agenda.enter(Phase::Sight);
+                }
+            }
+            Phase::Sight => {
+                let total = self.peaks.len();
+                let portion = self.agenda.take(total, looks * 7);
+                self.peaks[portion]
+                    .par_iter_mut()
+                    .for_each(|peak| peak.sight = Some(sight::sight(peak, &history)));
+                if self.agenda.done == total {
+                    self.others.clone_from(&self.particles);
+                    self.agenda.enter(Phase::Move(1));
+                }
+            }
+            Phase::Move(round) => {
+                let portion = self.agenda.take(count, looks);
+                let first = portion.start;
+                let proposals = Proposals::new(history, &self.others, &self.peaks);
+                self.particles[portion]
+                    .par_iter_mut()
+                    .enumerate()
+                    .for_each(|(index, particle)| {
+                        let index = first + index + round * count;
+                        proposals
+                            .mutate(particle, &mut stream(seed, key, index, Purpose::Propagate));
+                    });
+                if self.agenda.done == count {
+                    let last = round >= self.parameters.rounds;
+                    self.agenda.enter(if last {
+                        Phase::Idle
+                    } else {
+                        Phase::Move(round + 1)
+                    });
+                }
+            }
         }
     }
 
-    /// Particles all over the robot, with any radius, as likely as the first keyframe says.
-    fn spread(&mut self, step: &Step) {
-        let history = history(step, &self.memory, &self.noise);
-        let (seed, count) = (self.seed, self.parameters.hypotheses * FIRST_DRAWS);
-        self.particles = (0..count.div_ceil(CHUNK))
-            .into_par_iter()
-            .flat_map_iter(|chunk| {
-                let mut random = stream(seed, step.number, chunk, Purpose::Spread);
-                (0..CHUNK).map(move |_| draw(&history, &mut random))
-            })
-            .collect();
-    }
-
-    /// Weighs every particle by what the newest keyframe changed in its evidence.
-    fn reweigh(&mut self, step: &Step) {
-        let history = history(step, &self.memory, &self.noise);
-        self.particles
-            .par_iter_mut()
-            .with_min_len(CHUNK)
-            .for_each(|particle| {
-                let evidence = history.evidence(&mut particle.obstacle);
-                particle.log_weight += evidence.log - particle.evidence.log;
-                particle.log_prior = history.log_prior(&particle.obstacle, evidence.reference);
-                particle.evidence = evidence;
-            });
-    }
-
-    fn resample(&mut self, step: &Step) {
+    fn resample(&mut self) {
         let count = self.parameters.hypotheses;
         normalise(
             self.particles.iter().map(|particle| particle.log_weight),
@@ -173,7 +314,7 @@ impl PalpateFilter {
         {
             return;
         }
-        let mut random = stream(self.seed, step.number, 0, Purpose::Resample);
+        let mut random = stream(self.seed, self.key, 0, Purpose::Resample);
         let mut chosen = Vec::new();
         systematic(&self.weights, count, random.random(), &mut chosen);
         self.particles = (chosen.iter())
@@ -184,75 +325,36 @@ impl PalpateFilter {
             .collect();
     }
 
-    /// Keeps the peaks on top of the evidence, and now and then looks for others.
-    fn seek_peaks(&mut self, step: &Step) {
-        let history = history(step, &self.memory, &self.noise);
-        self.peaks
-            .par_iter_mut()
-            .for_each(|peak| peak.climb(&history, 1));
-        self.peaks.extend(self.hop(step, &history));
-        if scan::is_due(self.keyframes) {
-            self.peaks.extend(scan::peaks(&history));
-        }
-        peaks::keep_best(&mut self.peaks);
-        self.peaks
-            .par_iter_mut()
-            .for_each(|peak| peak.sight = sight::sight(peak, &history));
-    }
-
-    /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks, and from some particles.
-    fn hop(&self, step: &Step, history: &History) -> Vec<Peak> {
-        let starts = |index: usize| {
-            let mut random = stream(self.seed, step.number, index, Purpose::Hop);
-            match self.peaks.get(index).filter(|_| index < HOPS - 2) {
-                Some(peak) => Obstacle {
-                    core: peak.draw(history, &mut random),
-                    ..peak.obstacle
-                },
-                None => self.particles[random.random_range(0..self.particles.len())].obstacle,
+    /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks, and from particles, seen as balls
+    /// and bars in turn.
+    fn hop(&self, index: usize, history: &History) -> Peak {
+        let mut random = stream(self.seed, self.key, index, Purpose::Hop);
+        let start = match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
+            Some(peak) => Obstacle {
+                core: peak.draw(history, &mut random),
+                ..peak.obstacle
+            },
+            None => {
+                let particle = &self.particles[random.random_range(0..self.particles.len())];
+                let turn = std::f64::consts::PI * random.random::<f64>();
+                history.reshaped(&particle.obstacle, random.random::<bool>().then_some(turn))
             }
         };
-        (0..HOPS)
-            .into_par_iter()
-            .map(|index| {
-                let mut peak = Peak::new(starts(index), history);
-                peak.climb(history, HOP_CLIMB);
-                peak
-            })
-            .collect()
-    }
-
-    fn mutate(&mut self, step: &Step, round: usize) {
-        let history = history(step, &self.memory, &self.noise);
-        let others = self.particles.clone();
-        let proposals = Proposals::new(history, &others, &self.peaks);
-        let (seed, chunks) = (self.seed, others.len().div_ceil(CHUNK));
-        self.particles
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .for_each(|(chunk, particles)| {
-                let mut random = stream(
-                    seed,
-                    step.number,
-                    chunk + round * chunks,
-                    Purpose::Propagate,
-                );
-                for particle in particles {
-                    proposals.mutate(particle, &mut random);
-                }
-            });
+        let mut peak = Peak::new(start, history);
+        peak.climb(history, HOP_CLIMB);
+        peak
     }
 
     /// Adds to the modes' covariances what particles cannot show: the errors that systematically wrong torques cause.
     pub(crate) fn widen(&self, step: &Step, modes: &mut [Mode]) {
         for mode in modes {
             let apart = |peak: &&Peak| (peak.touch.point - mode.point_in_link).norm();
-            let nearest = (self
-                .peaks
-                .iter()
-                .filter(|peak| peak.obstacle.link as usize == mode.link))
-            .min_by(|a, b| apart(a).total_cmp(&apart(b)));
-            let sight = nearest.map_or_else(|| Matrix3::identity() * UNSEEN, |peak| peak.sight);
+            let seen =
+                |peak: &&Peak| peak.obstacle.link as usize == mode.link && peak.sight.is_some();
+            let nearest =
+                (self.peaks.iter().filter(seen)).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let unseen = Matrix3::identity() * UNSEEN;
+            let sight = nearest.and_then(|peak| peak.sight).unwrap_or(unseen);
             let rotation = step
                 .now
                 .root_from_link(mode.link)
@@ -264,6 +366,9 @@ impl PalpateFilter {
 
     /// Writes the particles, with their weights, as the outside sees them at this sample.
     pub(crate) fn show(&mut self, step: &Step, cloud: &mut Vec<Particle>) {
+        if self.particles.is_empty() {
+            return;
+        }
         normalise(
             self.particles.iter().map(|particle| particle.log_weight),
             &mut self.weights,
@@ -298,7 +403,7 @@ fn history<'a>(step: &Step<'a>, memory: &'a Memory, noise: &'a Noise) -> History
     }
 }
 
-/// A ball or bar anywhere on the robot.
+/// A ball or bar anywhere on the robot, as likely as the history says.
 fn draw(history: &History, random: &mut impl Rng) -> Hypothesis {
     let (link, place) = history.skin.sample(random.random());
     let [least, most] = obstacle::RADIUS_RANGE;
@@ -309,10 +414,23 @@ fn draw(history: &History, random: &mut impl Rng) -> Hypothesis {
     let mut obstacle =
         history.obstacle_on(link, place.triangle, &place.point, &normal, radius, bar);
     let evidence = history.evidence(&mut obstacle);
+    let log_prior = history.log_prior(&obstacle, radius);
     Hypothesis {
         obstacle,
         evidence,
-        log_prior: history.log_prior(&obstacle, radius),
+        log_prior,
         log_weight: evidence.log,
+    }
+}
+
+/// The particle with its weight changed by what the newest keyframe changed in its evidence.
+fn reweighed(particle: &Hypothesis, history: &History) -> Hypothesis {
+    let mut obstacle = particle.obstacle;
+    let evidence = history.evidence(&mut obstacle);
+    Hypothesis {
+        log_prior: history.log_prior(&obstacle, evidence.reference),
+        log_weight: particle.log_weight + evidence.log - particle.evidence.log,
+        obstacle,
+        evidence,
     }
 }

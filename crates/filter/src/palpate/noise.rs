@@ -84,6 +84,8 @@ pub(super) struct Noise {
     square: Vec<f64>,
     bias: [Vec<Bias>; BIAS_SCALES.len()],
     base: [f64; BIAS_SCALES.len()],
+    /// Inverse variances, joint by joint for each keyframe.
+    weights: Vec<f64>,
 }
 
 impl Noise {
@@ -98,6 +100,7 @@ impl Noise {
             square: vec![0.0; dof],
             bias: std::array::from_fn(|_| vec![Bias::default(); dof]),
             base: [0.0; BIAS_SCALES.len()],
+            weights: Vec::new(),
         }
     }
 
@@ -131,11 +134,34 @@ impl Noise {
         }
     }
 
-    /// Inverse variance of a keyframe's mean torque on one joint.
-    pub(super) fn weight(&self, keyframe: &Keyframe, joint: usize) -> f64 {
+    /// Inverse variance of the mean torque of the keyframe with this index on one joint, as of the last
+    /// [`Noise::sum`].
+    pub(super) fn weight(&self, keyframe: usize, joint: usize) -> f64 {
+        self.weights[keyframe * self.white.len() + joint]
+    }
+
+    fn weigh(&self, keyframe: &Keyframe, joint: usize) -> f64 {
         let floor = FLOOR * FLOOR + FLOOR_SHARE * FLOOR_SHARE * self.power[joint];
         let slow = floor * (FLOOR_SECS / keyframe.length_secs).min(1.0);
         1.0 / (self.inflation[joint] * (self.white[joint] / keyframe.samples + slow))
+    }
+
+    /// Mean squared normalised residual that a hypothesis, solved without it, leaves of the newest keyframe.
+    pub(super) fn misfit(
+        &self,
+        obstacle: &Obstacle,
+        evidence: &Evidence,
+        history: &History,
+    ) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        obstacle.predict_newest(evidence, history, |predicted, joint, measured| {
+            let weight = self.weigh(history.newest(), joint);
+            // What the biases may be is no misfit.
+            let bias = BIAS_SCALES[evidence.bias_scale].powi(2);
+            sum += (measured - predicted).powi(2) / (1.0 / weight + bias);
+            count += 1.0;
+        });
+        sum / f64::max(count, 1.0)
     }
 
     /// How much larger than expected the residuals of the best hypothesis are, joint by joint: the inflation to be
@@ -171,10 +197,16 @@ impl Noise {
     /// Sums over the history what all hypotheses share.
     pub(super) fn sum(&mut self, keyframes: &[Keyframe]) {
         self.base = [0.0; BIAS_SCALES.len()];
+        self.weights.clear();
+        for keyframe in keyframes {
+            for joint in 0..self.white.len() {
+                self.weights.push(self.weigh(keyframe, joint));
+            }
+        }
         for joint in 0..self.white.len() {
             let (mut weight, mut first, mut second, mut log) = (0.0, 0.0, 0.0, 0.0);
             for keyframe in keyframes {
-                let w = self.weight(keyframe, joint);
+                let w = self.weigh(keyframe, joint);
                 weight += w;
                 first += w * keyframe.torque[joint];
                 second += w * keyframe.torque[joint].powi(2);

@@ -150,11 +150,11 @@ impl Obstacle {
         let path = &robot.links[link].path;
         let mut sums = Sums::default();
         let mut newest: Option<Touch> = None;
-        self.follow(skin, keyframes, |_, keyframe, touch| {
+        self.follow(skin, keyframes, |index, keyframe, touch| {
             let e = newest.get_or_insert(touch).distance - touch.distance;
             sums.add(
                 e,
-                joint_torques(&keyframe.links[link], keyframe, &touch, path, noise),
+                joint_torques(&keyframe.links[link], keyframe, index, &touch, path, noise),
             );
         });
         let Some(newest) = newest else {
@@ -198,11 +198,17 @@ impl Obstacle {
         let link = self.link as usize;
         let path = &history.robot.links[link].path;
         let mut newest = None;
-        self.follow(history.skin, history.keyframes, |_, keyframe, touch| {
+        self.follow(history.skin, history.keyframes, |index, keyframe, touch| {
             let e = *newest.get_or_insert(touch.distance) - touch.distance;
             let force = evidence.force + evidence.stiffness * e;
-            let torques =
-                joint_torques(&keyframe.links[link], keyframe, &touch, path, history.noise);
+            let torques = joint_torques(
+                &keyframe.links[link],
+                keyframe,
+                index,
+                &touch,
+                path,
+                history.noise,
+            );
             for (torque, &joint) in torques.zip(path) {
                 take(
                     (torque.normal + evidence.friction * torque.tangential) * force,
@@ -212,11 +218,42 @@ impl Obstacle {
             }
         });
     }
+
+    /// The newest keyframe's torques as a hypothesis predicts them that was solved without it: calls
+    /// `take(predicted, joint, measured)`.
+    pub(super) fn predict_newest(
+        &self,
+        evidence: &Evidence,
+        history: &History,
+        mut take: impl FnMut(f64, usize, f64),
+    ) {
+        let link = self.link as usize;
+        let path = &history.robot.links[link].path;
+        let keyframe = history.newest();
+        let touch = self.touch(history.skin, &keyframe.links[link].link_from_root);
+        let force = evidence.force_at(touch.distance);
+        let torques = joint_torques(
+            &keyframe.links[link],
+            keyframe,
+            0,
+            &touch,
+            path,
+            history.noise,
+        );
+        for (torque, &joint) in torques.zip(path) {
+            take(
+                (torque.normal + evidence.friction * torque.tangential) * force,
+                joint,
+                torque.measured,
+            );
+        }
+    }
 }
 
 fn joint_torques<'a>(
     view: &'a LinkView,
     keyframe: &'a Keyframe,
+    index: usize,
     touch: &Touch,
     path: &'a [usize],
     noise: &'a Noise,
@@ -241,7 +278,7 @@ fn joint_torques<'a>(
                 normal: apply(&push, &push_moment),
                 tangential: apply(&rub, &rub_moment),
                 measured: keyframe.torque[joint],
-                weight: noise.weight(keyframe, joint),
+                weight: noise.weight(index, joint),
             }
         })
 }

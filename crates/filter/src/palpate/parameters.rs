@@ -8,17 +8,17 @@ use crate::ParameterError;
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct PalpateParameters {
-    /// Number of hypotheses that are weighed by the whole history; these are the cloud's particles. Default 500.
+    /// Number of hypotheses that are weighed by the whole history; these are the cloud's particles. Default 400.
     pub hypotheses: usize,
-    /// Moves that each hypothesis tries after each keyframe. Default 3.
+    /// Moves that each hypothesis tries after each keyframe. Default 4.
     pub rounds: usize,
 }
 
 impl Default for PalpateParameters {
     fn default() -> Self {
         Self {
-            hypotheses: 500,
-            rounds: 3,
+            hypotheses: 400,
+            rounds: 4,
         }
     }
 }

@@ -30,8 +30,9 @@ pub(super) struct Peak {
     precision: Matrix4<f64>,
     /// Lower Cholesky factor of the covariance.
     root: Matrix4<f64>,
-    /// Covariance of the contact point from systematic errors, m², in the link's frame ([`sight`]).
-    pub(super) sight: Matrix3<f64>,
+    /// Covariance of the contact point from systematic errors, m², in the link's frame, once it was
+    /// looked at.
+    pub(super) sight: Option<Matrix3<f64>>,
 }
 
 impl Peak {
@@ -45,7 +46,7 @@ impl Peak {
             log_mass: evidence.log,
             precision: Matrix4::identity(),
             root: Matrix4::identity(),
-            sight: Matrix3::identity(),
+            sight: None,
             obstacle,
             evidence,
             touch,
@@ -63,7 +64,10 @@ impl Peak {
 
     /// One step of Newton's method with all derivatives by finite differences. Tells how far it moved, in steps.
     fn step(&mut self, history: &History) -> f64 {
-        *self = Self::new(self.obstacle, history);
+        *self = Self {
+            sight: self.sight,
+            ..Self::new(self.obstacle, history)
+        };
         let dimension = self.chart.dimension();
         let value = |x: &Vector4<f64>| self.try_at(x, history).2;
         let here = value(&Vector4::zeros());
@@ -227,7 +231,7 @@ impl Peak {
 }
 
 /// Most peaks kept.
-const MOST: usize = 12;
+const MOST: usize = 16;
 
 /// Leaves the peaks with the largest mass, each once, the largest first.
 pub(super) fn keep_best(peaks: &mut Vec<Peak>) {

@@ -1,24 +1,27 @@
 //! Where on the robot the newest torques could come from: every triangle is asked, and the best are climbed from.
 
 use nalgebra::{Matrix6, Vector6};
+use rand::{Rng, RngExt};
 use rayon::prelude::*;
 
 use super::history::History;
 use super::peaks::Peak;
+use crate::random::{Purpose, stream};
 
 /// Keyframes since the contact began after which a scan is due; later every so many.
 const FIRST: [usize; 8] = [1, 2, 3, 5, 7, 10, 14, 19];
 const EVERY: usize = 10;
-/// Most candidates of each link.
-const CANDIDATES: usize = 6;
+/// Candidates of each link: the best minima of the misfit, and triangles drawn as likely as they are.
+const MINIMA: usize = 4;
+const DRAWN: usize = 3;
 /// Radii that a climb may start with, m.
 const RADII: [f64; 3] = [0.006, 0.04, 0.25];
 /// Directions that a bar may start with.
 const DIRECTIONS: usize = 4;
 /// Newton steps of a climb.
-const CLIMB: usize = 8;
+pub(super) const CLIMB: usize = 8;
 /// Ball peaks that bars are tried in the place of.
-const BARS: usize = 8;
+pub(super) const BARS: usize = 8;
 
 /// Extra standard deviation, Nm, and as a share of the torque, for what one keyframe alone cannot tell: bias and
 /// friction.
@@ -27,7 +30,7 @@ const SLACK_SHARE: f64 = 0.05;
 
 /// A triangle that explains a keyframe's torques better than its neighbours do.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
+pub(super) struct Candidate {
     link: usize,
     triangle: u32,
     /// Squared normalised error that a push on the triangle's centre leaves.
@@ -39,26 +42,16 @@ pub(super) fn is_due(keyframes: usize) -> bool {
     FIRST.contains(&keyframes) || keyframes.is_multiple_of(EVERY)
 }
 
-/// Peaks that the newest keyframe leads to: balls first, then bars where the best balls are.
-pub(super) fn peaks(history: &History) -> Vec<Peak> {
+/// Triangles of all links that a push on explains the newest torques.
+pub(super) fn candidates(history: &History, seed: u64, key: u64) -> Vec<Candidate> {
     let links = history.skin.links();
-    let candidates: Vec<Candidate> = links
-        .par_iter()
-        .flat_map_iter(|&link| candidates(history, link))
-        .collect();
-    let mut balls: Vec<Peak> = candidates
-        .par_iter()
-        .map(|candidate| climb_ball(history, candidate))
-        .collect();
-    super::peaks::keep_best(&mut balls);
-    let bars: Vec<Peak> = (balls.par_iter().take(BARS))
-        .map(|ball| climb_bar(history, ball))
-        .collect();
-    balls.extend(bars);
-    balls
+    let of_link =
+        |&link: &usize| of_link(history, link, &mut stream(seed, key, link, Purpose::Fresh));
+    links.par_iter().flat_map_iter(of_link).collect()
 }
 
-fn climb_ball(history: &History, candidate: &Candidate) -> Peak {
+/// Climbs from a candidate as a ball.
+pub(super) fn climb_ball(history: &History, candidate: &Candidate) -> Peak {
     let surface = history.skin.surface(candidate.link);
     let (foot, normal) = (
         surface.centroid(candidate.triangle),
@@ -74,7 +67,8 @@ fn climb_ball(history: &History, candidate: &Candidate) -> Peak {
     climb_best(history, RADII.map(start).into_iter())
 }
 
-fn climb_bar(history: &History, ball: &Peak) -> Peak {
+/// Climbs as a bar from where a peak is.
+pub(super) fn climb_bar(history: &History, ball: &Peak) -> Peak {
     let link = ball.obstacle.link as usize;
     let (touch, radius) = (&ball.touch, ball.touch.distance);
     let start = |direction: usize| {
@@ -107,8 +101,8 @@ fn climb_best(history: &History, starts: impl Iterator<Item = Peak>) -> Peak {
     peak
 }
 
-/// The best triangles of one link: minima of the misfit among their neighbours.
-fn candidates(history: &History, link: usize) -> Vec<Candidate> {
+/// Triangles of one link that a push on explains the newest torques.
+fn of_link(history: &History, link: usize, random: &mut impl Rng) -> Vec<Candidate> {
     let (surface, keyframe) = (history.skin.surface(link), history.newest());
     let view = &keyframe.links[link];
     let mut a = Matrix6::zeros();
@@ -117,7 +111,7 @@ fn candidates(history: &History, link: usize) -> Vec<Candidate> {
     let weight = |joint: usize| {
         let torque = keyframe.torque[joint];
         let slack = SLACK * SLACK + (SLACK_SHARE * torque).powi(2);
-        1.0 / (1.0 / history.noise.weight(keyframe, joint) + slack)
+        1.0 / (1.0 / history.noise.weight(history.keyframes.len() - 1, joint) + slack)
     };
     for (column, &joint) in view
         .screws
@@ -140,21 +134,39 @@ fn candidates(history: &History, link: usize) -> Vec<Candidate> {
         measured - along * along / w.dot(&(a * w)).max(1e-12)
     };
     let misfits: Vec<f64> = (0..surface.triangle_count() as u32).map(misfit).collect();
+    let candidate = |triangle: u32| Candidate {
+        link,
+        triangle,
+        misfit: misfits[triangle as usize],
+    };
     let is_minimum = |&triangle: &u32| {
         let own = misfits[triangle as usize];
         surface
             .neighbours(triangle)
             .all(|other| own <= misfits[other as usize])
     };
-    let mut candidates: Vec<Candidate> = (0..misfits.len() as u32)
-        .filter(is_minimum)
-        .map(|triangle| Candidate {
-            link,
-            triangle,
-            misfit: misfits[triangle as usize],
+    let all = 0..misfits.len() as u32;
+    let mut minima: Vec<Candidate> = all.clone().filter(is_minimum).map(candidate).collect();
+    minima.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    minima.truncate(MINIMA);
+    // Where many triangles fit alike, any of them may be meant: some are drawn as likely as they are, by the
+    // largest sums of log weight and Gumbel noise (Yellott 1977).
+    let mut drawn: Vec<(f64, u32)> = all
+        .map(|triangle| {
+            let uniform = random.random::<f64>().max(f64::MIN_POSITIVE);
+            let gumbel = -(-uniform.ln()).ln();
+            (
+                gumbel - 0.5 * misfits[triangle as usize] + surface.triangle_area(triangle).ln(),
+                triangle,
+            )
         })
         .collect();
-    candidates.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
-    candidates.truncate(CANDIDATES);
-    candidates
+    drawn.sort_by(|a, b| b.0.total_cmp(&a.0));
+    minima.extend(
+        drawn
+            .iter()
+            .take(DRAWN)
+            .map(|&(_, triangle)| candidate(triangle)),
+    );
+    minima
 }
