@@ -49,8 +49,6 @@ const HOPS_FROM_PEAKS: usize = 5;
 const HOP_CLIMB: usize = 3;
 /// Evaluations that one Newton step takes.
 const STEP_COST: usize = 14;
-/// Variance of a contact's place on a link without a peak, m².
-const UNSEEN: f64 = 0.01;
 /// A keyframe whose mean squared normalised residual exceeds this does not belong to the contact as it was known; so
 /// many in a row are a new contact.
 const MISFIT: f64 = 16.0;
@@ -353,7 +351,7 @@ impl PalpateFilter {
                 |peak: &&Peak| peak.obstacle.link as usize == mode.link && peak.sight.is_some();
             let nearest =
                 (self.peaks.iter().filter(seen)).min_by(|a, b| apart(a).total_cmp(&apart(b)));
-            let unseen = Matrix3::identity() * UNSEEN;
+            let unseen = Matrix3::identity() * sight::UNSEEN;
             let sight = nearest.and_then(|peak| peak.sight).unwrap_or(unseen);
             let rotation = step
                 .now

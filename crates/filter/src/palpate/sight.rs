@@ -14,12 +14,22 @@ const ERROR: f64 = 0.01;
 /// direction, of the force (1/N²) and of the stiffness (m²/N²).
 const PRIOR: [f64; 6] = [25.0, 25.0, 0.4, 1.0, 3e-4, 2.5e-9];
 
+/// Fewest joints that must feel a contact for its place to be seen: one torque a sample cannot tell two coordinates and
+/// a force apart, whatever it does over time that a wrong model could not do as well.
+const LEAST_JOINTS: usize = 2;
+/// Variance of a place that cannot be seen, m²: about the size of a link.
+pub(super) const UNSEEN: f64 = 0.01;
+
 /// Covariance (m², link frame) of the contact point that systematic errors of the torques cause.
 ///
 /// With D the derivatives of the predicted torques by place, radius, direction, force and stiffness, an error of
 /// variance Σ that lasts as long as the history leaves the information Dᵀ Σ⁻¹ D averaged over the history, not
 /// summed: more samples of the same do not help, other configurations do.
 pub(super) fn sight(peak: &Peak, history: &History) -> Matrix3<f64> {
+    let link = &history.robot.links[peak.obstacle.link as usize];
+    if link.path.len() < LEAST_JOINTS {
+        return Matrix3::identity() * UNSEEN;
+    }
     let columns = derivatives(peak, history);
     let mut information = Matrix6::from_diagonal(&Vector6::from(PRIOR));
     let samples: f64 = history
@@ -27,7 +37,6 @@ pub(super) fn sight(peak: &Peak, history: &History) -> Matrix3<f64> {
         .iter()
         .map(|keyframe| keyframe.samples)
         .sum();
-    let link = &history.robot.links[peak.obstacle.link as usize];
     for (row, derivatives) in columns.iter().enumerate() {
         let keyframe = &history.keyframes[history.keyframes.len() - 1 - row / link.path.len()];
         let joint = link.path[row % link.path.len()];
