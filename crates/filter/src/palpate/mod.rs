@@ -18,14 +18,12 @@ mod parameters;
 mod peaks;
 mod scan;
 mod sight;
+mod work;
 
 use nalgebra::Matrix3;
 use palpate_model::Robot;
-use rand::{Rng, RngExt};
-use rayon::prelude::*;
 
-use crate::random::{Purpose, stream};
-use crate::resample::{effective_sample_size, normalise, systematic};
+use crate::resample::normalise;
 use crate::step::Step;
 use crate::{Mode, Particle};
 
@@ -34,21 +32,12 @@ use evidence::Evidence;
 pub(crate) use evidence::MOST_JOINTS;
 use history::History;
 use memory::Memory;
-use moves::Proposals;
 use noise::Noise;
 use obstacle::Obstacle;
 pub use parameters::PalpateParameters;
 use peaks::Peak;
-use scan::Candidate;
+use work::Workbench;
 
-/// Draws for each particle at the start.
-const FIRST_DRAWS: usize = 8;
-/// Climbs from new places at each keyframe, the first of them from beside the best peaks, and the steps of each.
-const HOPS: usize = 8;
-const HOPS_FROM_PEAKS: usize = 5;
-const HOP_CLIMB: usize = 3;
-/// Evaluations that one Newton step takes.
-const STEP_COST: usize = 14;
 /// A keyframe whose mean squared normalised residual exceeds this does not belong to the contact as it was known; so
 /// many in a row are a new contact.
 const MISFIT: f64 = 16.0;
@@ -73,11 +62,8 @@ pub(crate) struct PalpateFilter {
     weights: Vec<f64>,
     peaks: Vec<Peak>,
     agenda: Agenda,
-    /// What the present phase has made so far, to take effect when it is complete.
-    renewed: Vec<Hypothesis>,
-    found: Vec<Peak>,
-    candidates: Vec<Candidate>,
-    others: Vec<Hypothesis>,
+    bench: Workbench,
+    chosen: Vec<u32>,
     /// Number of the sample that completed the newest keyframe: keys the random streams.
     key: u64,
     /// Keyframes since the contact began, and how many of the last ones did not fit.
@@ -96,10 +82,8 @@ impl PalpateFilter {
             weights: Vec::new(),
             peaks: Vec::new(),
             agenda: Agenda::new(),
-            renewed: Vec::new(),
-            found: Vec::new(),
-            candidates: Vec::new(),
-            others: Vec::new(),
+            bench: Workbench::default(),
+            chosen: Vec::new(),
             key: 0,
             keyframes: 0,
             misfits: 0,
@@ -116,6 +100,7 @@ impl PalpateFilter {
     fn forget_places(&mut self) {
         self.particles.clear();
         self.peaks.clear();
+        self.bench.clear();
         self.agenda.enter(Phase::Idle);
         self.keyframes = 0;
         self.misfits = 0;
@@ -176,173 +161,6 @@ impl PalpateFilter {
             .max_by(|a, b| a.1.log.total_cmp(&b.1.log))
     }
 
-    /// Does a portion of the present phase, and what completes it if that was the last.
-    fn work(&mut self, step: &Step) {
-        let history = history(step, &self.memory, &self.noise);
-        let looks = self.memory.keyframes.len();
-        let count = self.particles.len();
-        let (seed, key) = (self.seed, self.key);
-        match self.agenda.phase {
-            Phase::Idle => {}
-            Phase::Spread => {
-                let total = self.parameters.hypotheses * FIRST_DRAWS;
-                let portion = self.agenda.take(total, looks);
-                let draw = |index| draw(&history, &mut stream(seed, key, index, Purpose::Spread));
-                self.renewed.par_extend(portion.into_par_iter().map(draw));
-                if self.agenda.done == total {
-                    self.particles = std::mem::take(&mut self.renewed);
-                    self.resample();
-                    self.agenda.enter(Phase::Climb);
-                }
-            }
-            Phase::Reweigh => {
-                let portion = self.agenda.take(count, looks);
-                let particles = &self.particles[portion];
-                self.renewed.par_extend(
-                    particles
-                        .par_iter()
-                        .map(|particle| reweighed(particle, &history)),
-                );
-                if self.agenda.done == count {
-                    std::mem::swap(&mut self.particles, &mut self.renewed);
-                    self.renewed.clear();
-                    self.resample();
-                    self.agenda.enter(Phase::Climb);
-                }
-            }
-            Phase::Climb => {
-                let total = self.peaks.len();
-                let portion = self.agenda.take(total, looks * STEP_COST);
-                self.peaks[portion]
-                    .par_iter_mut()
-                    .for_each(|peak| peak.climb(&history, 1));
-                if self.agenda.done == total {
-                    self.agenda.enter(Phase::Hop);
-                }
-            }
-            Phase::Hop => {
-                let portion = self.agenda.take(HOPS, looks * STEP_COST * HOP_CLIMB);
-                let hops: Vec<Peak> = portion
-                    .into_par_iter()
-                    .map(|index| self.hop(index, &history))
-                    .collect();
-                self.found.extend(hops);
-                if self.agenda.done == HOPS {
-                    self.candidates.clear();
-                    if scan::is_due(self.keyframes) {
-                        self.candidates = scan::candidates(&history, seed, key);
-                    }
-                    self.agenda.enter(Phase::Scan);
-                }
-            }
-            Phase::Scan => {
-                let total = self.candidates.len();
-                let portion = self.agenda.take(total, looks * STEP_COST * scan::CLIMB);
-                let candidates = &self.candidates[portion];
-                self.found.par_extend(
-                    candidates
-                        .par_iter()
-                        .map(|candidate| scan::climb_ball(&history, candidate)),
-                );
-                if self.agenda.done == total {
-                    self.peaks.append(&mut self.found);
-                    peaks::keep_best(&mut self.peaks);
-                    self.agenda.enter(Phase::Bars);
-                }
-            }
-            Phase::Bars => {
-                let total = if self.candidates.is_empty() {
-                    0
-                } else {
-                    scan::BARS.min(self.peaks.len())
-                };
-                let portion = self.agenda.take(total, looks * STEP_COST * scan::CLIMB);
-                let balls = &self.peaks[portion];
-                self.found
-                    .par_extend(balls.par_iter().map(|ball| scan::climb_bar(&history, ball)));
-                if self.agenda.done == total {
-                    self.peaks.append(&mut self.found);
-                    peaks::keep_best(&mut self.peaks);
-                    self.agenda.enter(Phase::Sight);
-                }
-            }
-            Phase::Sight => {
-                let total = self.peaks.len();
-                let portion = self.agenda.take(total, looks * 7);
-                self.peaks[portion]
-                    .par_iter_mut()
-                    .for_each(|peak| peak.sight = Some(sight::sight(peak, &history)));
-                if self.agenda.done == total {
-                    self.others.clone_from(&self.particles);
-                    self.agenda.enter(Phase::Move(1));
-                }
-            }
-            Phase::Move(round) => {
-                let portion = self.agenda.take(count, looks);
-                let first = portion.start;
-                let proposals = Proposals::new(history, &self.others, &self.peaks);
-                self.particles[portion]
-                    .par_iter_mut()
-                    .enumerate()
-                    .for_each(|(index, particle)| {
-                        let index = first + index + round * count;
-                        proposals
-                            .mutate(particle, &mut stream(seed, key, index, Purpose::Propagate));
-                    });
-                if self.agenda.done == count {
-                    let last = round >= self.parameters.rounds;
-                    self.agenda.enter(if last {
-                        Phase::Idle
-                    } else {
-                        Phase::Move(round + 1)
-                    });
-                }
-            }
-        }
-    }
-
-    fn resample(&mut self) {
-        let count = self.parameters.hypotheses;
-        normalise(
-            self.particles.iter().map(|particle| particle.log_weight),
-            &mut self.weights,
-        );
-        if self.particles.len() == count
-            && effective_sample_size(&self.weights) > 0.5 * count as f64
-        {
-            return;
-        }
-        let mut random = stream(self.seed, self.key, 0, Purpose::Resample);
-        let mut chosen = Vec::new();
-        systematic(&self.weights, count, random.random(), &mut chosen);
-        self.particles = (chosen.iter())
-            .map(|&parent| Hypothesis {
-                log_weight: 0.0,
-                ..self.particles[parent as usize]
-            })
-            .collect();
-    }
-
-    /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks, and from particles, seen as balls
-    /// and bars in turn.
-    fn hop(&self, index: usize, history: &History) -> Peak {
-        let mut random = stream(self.seed, self.key, index, Purpose::Hop);
-        let start = match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
-            Some(peak) => Obstacle {
-                core: peak.draw(history, &mut random),
-                ..peak.obstacle
-            },
-            None => {
-                let particle = &self.particles[random.random_range(0..self.particles.len())];
-                let turn = std::f64::consts::PI * random.random::<f64>();
-                history.reshaped(&particle.obstacle, random.random::<bool>().then_some(turn))
-            }
-        };
-        let mut peak = Peak::new(start, history);
-        peak.climb(history, HOP_CLIMB);
-        peak
-    }
-
     /// Adds to the modes' covariances what particles cannot show: the errors that systematically wrong torques cause.
     pub(crate) fn widen(&self, step: &Step, modes: &mut [Mode]) {
         for mode in modes {
@@ -398,37 +216,5 @@ fn history<'a>(step: &Step<'a>, memory: &'a Memory, noise: &'a Noise) -> History
         skin: step.skin,
         keyframes: &memory.keyframes,
         noise,
-    }
-}
-
-/// A ball or bar anywhere on the robot, as likely as the history says.
-fn draw(history: &History, random: &mut impl Rng) -> Hypothesis {
-    let (link, place) = history.skin.sample(random.random());
-    let [least, most] = obstacle::RADIUS_RANGE;
-    let radius = least * (most / least).powf(random.random());
-    let normal = history.skin.surface(link).normal(place.triangle);
-    let turn = std::f64::consts::PI * random.random::<f64>();
-    let bar = random.random::<bool>().then_some(turn);
-    let mut obstacle =
-        history.obstacle_on(link, place.triangle, &place.point, &normal, radius, bar);
-    let evidence = history.evidence(&mut obstacle);
-    let log_prior = history.log_prior(&obstacle, radius);
-    Hypothesis {
-        obstacle,
-        evidence,
-        log_prior,
-        log_weight: evidence.log,
-    }
-}
-
-/// The particle with its weight changed by what the newest keyframe changed in its evidence.
-fn reweighed(particle: &Hypothesis, history: &History) -> Hypothesis {
-    let mut obstacle = particle.obstacle;
-    let evidence = history.evidence(&mut obstacle);
-    Hypothesis {
-        log_prior: history.log_prior(&obstacle, evidence.reference),
-        log_weight: particle.log_weight + evidence.log - particle.evidence.log,
-        obstacle,
-        evidence,
     }
 }
