@@ -14,7 +14,6 @@ use super::campaign::{in_parallel, threads};
 use super::estimator::Estimator;
 use super::report::{Report, parameters, wall_time};
 use super::score::{Known, Score, score};
-use super::seed::mixed;
 use super::summary::Summary;
 use super::table::{heads, markdown, millimetres, percent, seconds};
 use super::trial::Outcome;
@@ -134,7 +133,8 @@ fn score_one(
     let samples = read_samples(&bag, robot, &TopicChoice::default(), tolerance_ns)?.samples;
     let rows = TruthRow::read_all(&read_text(&trial.folder.join("truth.csv"))?)?;
     let truth = known(robot, &rows, &samples)?;
-    let mut filter = Filter::new(robot, &estimator.parameters(particles), mixed(&[seed]))?;
+    // The seed itself, so that `palpate replay` gives the same estimates.
+    let mut filter = Filter::new(robot, &estimator.parameters(particles), seed)?;
     score(&mut filter, robot.dof(), &samples, &truth, |_, _| {})
         .ok_or_else(|| Usage("its truth.csv has no row with contact".to_owned()).into())
 }

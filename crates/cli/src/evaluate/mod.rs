@@ -179,11 +179,7 @@ impl Evaluate {
                 Usage(format!("--methods {name}: expected some of {names}"))
             })
         };
-        Ok(self
-            .methods
-            .iter()
-            .map(named)
-            .collect::<Result<_, _>>()?)
+        Ok(self.methods.iter().map(named).collect::<Result<_, _>>()?)
     }
 
     fn load_robot(&self) -> Result<Robot> {

@@ -14,8 +14,8 @@ use super::report::Report;
 use super::score::Score;
 use super::table::{heads, markdown, millimetres};
 use super::trial::{Cell, Setup};
-use crate::told;
 use crate::picture::{Instant, Moment, Picture};
+use crate::told;
 
 /// Times at which the particles are shown, s; the last one is the end.
 const SHOWN_SECS: [f64; 2] = [0.0, 0.5];

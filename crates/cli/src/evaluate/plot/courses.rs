@@ -9,10 +9,19 @@ use crate::last_second::median;
 use crate::picture::svg::{Anchor, Svg};
 
 const HEIGHT: f64 = 260.0;
+
 /// Colours of links, from the base outwards.
-const COLOURS: [&str; 7] = [
-    "#8c959f", "#8250df", "#1f6feb", "#17a2b8", "#2da44e", "#e8a33d", "#cf222e",
-];
+fn colour_of(link: usize) -> &'static str {
+    match link % 7 {
+        1 => "#8c959f",
+        2 => "#8250df",
+        3 => "#1f6feb",
+        4 => "#17a2b8",
+        5 => "#2da44e",
+        6 => "#e8a33d",
+        _ => "#cf222e",
+    }
+}
 
 pub fn draw(data: &Data) -> String {
     let all: Vec<_> = (data.experiment.conditions.iter())
@@ -38,13 +47,13 @@ pub fn draw(data: &Data) -> String {
             svg.text([left, top + 22.0], Anchor::Start, "head", &title);
             panel.draw_y(svg, &ERROR_TICKS, "position error, mm");
             panel.mark(svg, shown_error(FOUND), "2 cm");
-            for (link, colour) in data.links.iter().zip(COLOURS.iter().cycle()) {
+            for &link in data.links {
                 let cell = Cell {
                     condition: name,
                     estimator,
-                    link: *link,
+                    link,
                 };
-                draw_course(svg, data, &panel, &cell, colour);
+                draw_course(svg, data, &panel, &cell, colour_of(link));
             }
             draw_legend(svg, data.links, [left + 12.0, top + 34.0 + HEIGHT - 10.0]);
             panel.draw_x(
@@ -75,7 +84,8 @@ fn draw_course(svg: &mut Svg, data: &Data, panel: &Panel, cell: &Cell, colour: &
 }
 
 fn draw_legend(svg: &mut Svg, links: &[usize], [mut x, y]: [f64; 2]) {
-    for (link, colour) in links.iter().zip(COLOURS.iter().cycle()) {
+    for &link in links {
+        let colour = colour_of(link);
         svg.add(format_args!(
             r#"<path stroke="{colour}" stroke-width="3" d="M{x:.1} {:.1}h18"/>"#,
             y - 4.0

@@ -11,11 +11,16 @@ const HEIGHT: f64 = 330.0;
 pub fn draw(data: &Data) -> String {
     let panels = data.panels();
     let subtitle = "each dot a trial, bars the medians";
-    data.draw(subtitle, panels.len(), HEIGHT + HEAD + FOOT, |svg, index, at| {
-        if let Some((title, series)) = panels.get(index) {
-            draw_panel(svg, data, title, series, at);
-        }
-    })
+    data.draw(
+        subtitle,
+        panels.len(),
+        HEIGHT + HEAD + FOOT,
+        |svg, index, at| {
+            if let Some((title, series)) = panels.get(index) {
+                draw_panel(svg, data, title, series, at);
+            }
+        },
+    )
 }
 
 fn draw_panel(svg: &mut Svg, data: &Data, title: &str, series: &[Series], [left, top]: [f64; 2]) {
@@ -50,7 +55,10 @@ fn draw_trials(
     [middle, step]: [f64; 2],
 ) {
     let outcomes = data.campaign.outcomes(&series.cell(link));
-    let errors = outcomes.iter().flatten().map(|score| shown_error(score.error));
+    let errors = outcomes
+        .iter()
+        .flatten()
+        .map(|score| shown_error(score.error));
     let dots = errors.enumerate().map(|(trial, error)| {
         // Aside by chance, so that equal ones are told apart.
         let aside = share(&[link as u64, trial as u64]) - 0.5;

@@ -46,12 +46,17 @@ pub fn draw_calibration(data: &Data) -> String {
 pub fn draw_right_link(data: &Data) -> String {
     let panels = data.panels();
     let subtitle = "mean share of the last second that names the right link";
-    data.draw(subtitle, panels.len(), HEIGHT + HEAD + FOOT, |svg, index, at| {
-        if let Some((title, series)) = panels.get(index) {
-            let value = |summary: &Summary| (summary.right_link, [summary.right_link; 2]);
-            draw_panel(svg, data, (title, series), at, "last second, %", &value);
-        }
-    })
+    data.draw(
+        subtitle,
+        panels.len(),
+        HEIGHT + HEAD + FOOT,
+        |svg, index, at| {
+            if let Some((title, series)) = panels.get(index) {
+                let value = |summary: &Summary| (summary.right_link, [summary.right_link; 2]);
+                draw_panel(svg, data, (title, series), at, "last second, %", &value);
+            }
+        },
+    )
 }
 
 fn draw_panel(
