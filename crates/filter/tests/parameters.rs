@@ -1,0 +1,198 @@
+//! Every parameter out of its range is refused by its name, with what was expected and what was found.
+
+#![allow(clippy::unwrap_used)]
+
+use palpate_filter::{Filter, Parameters, Settings};
+use palpate_model::{LoadOptions, iiwa14};
+
+type Change = fn(&mut Parameters, f64);
+
+/// A parameter's full name, its range as errors tell it, how to set it, and values outside its range.
+type Case = (&'static str, &'static str, Change, &'static [f64]);
+
+const NOT_POSITIVE: &[f64] = &[0.0, -1.0, f64::NAN, f64::INFINITY];
+const NO_SHARE: &[f64] = &[-0.1, 1.1, f64::NAN, f64::INFINITY];
+
+const CASES: &[Case] = &[
+    (
+        "particles",
+        "100",
+        |p, v| p.particles = v as usize,
+        &[0.0, 99.0, 10_000_001.0],
+    ),
+    (
+        "located_probability",
+        "0 … 1",
+        |p, v| p.located_probability = v,
+        NO_SHARE,
+    ),
+    (
+        "tolerance",
+        "0 … 0.1",
+        |p, v| p.tolerance = v,
+        &[-0.1, 0.2, f64::NAN],
+    ),
+    ("located_std", "> 0", |p, v| p.located_std = v, NOT_POSITIVE),
+    (
+        "detector.on_torque",
+        "> 0",
+        |p, v| p.detector.on_torque = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "detector.off_torque",
+        "on_torque",
+        |p, v| p.detector.off_torque = v,
+        &[-0.1, 0.9, f64::NAN],
+    ),
+    (
+        "detector.smoothing_secs",
+        "10",
+        |p, v| p.detector.smoothing_secs = v,
+        &[-0.1, 11.0, f64::NAN],
+    ),
+    (
+        "detector.release_secs",
+        "60",
+        |p, v| p.detector.release_secs = v,
+        &[-0.1, 61.0, f64::NAN],
+    ),
+    (
+        "palpate.hypotheses",
+        "50",
+        |p, v| p.palpate.hypotheses = v as usize,
+        &[0.0, 49.0, 100_001.0],
+    ),
+    (
+        "palpate.rounds",
+        "100",
+        |p, v| p.palpate.rounds = v as usize,
+        &[0.0, 101.0],
+    ),
+    (
+        "paper.lambda",
+        "> 0",
+        |p, v| p.paper.lambda[0] = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.lambda",
+        "> 0",
+        |p, v| p.paper.lambda[1] = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.location_noise",
+        "> 0",
+        |p, v| p.paper.location_noise[0] = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.location_noise",
+        "> 0",
+        |p, v| p.paper.location_noise[1] = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.force_noise",
+        "> 0",
+        |p, v| p.paper.force_noise[0] = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.force_noise",
+        "> 0",
+        |p, v| p.paper.force_noise[1] = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.stiffness_noise",
+        "> 0",
+        |p, v| p.paper.stiffness_noise[0] = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.stiffness_noise",
+        "> 0",
+        |p, v| p.paper.stiffness_noise[1] = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.stiffness_range",
+        "> 0",
+        |p, v| p.paper.stiffness_range[0] = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.schedule_travel",
+        "> 0",
+        |p, v| p.paper.schedule_travel = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.force_max",
+        "> 0",
+        |p, v| p.paper.force_max = v,
+        NOT_POSITIVE,
+    ),
+    (
+        "paper.resample_below",
+        "0 … 1",
+        |p, v| p.paper.resample_below = v,
+        NO_SHARE,
+    ),
+    (
+        "paper.fresh_share",
+        "0 … 1",
+        |p, v| p.paper.fresh_share = v,
+        NO_SHARE,
+    ),
+];
+
+#[test]
+fn a_parameter_out_of_range_is_named_with_its_range_and_what_was_found() {
+    let robot = iiwa14(&LoadOptions::default()).unwrap();
+    assert!(Filter::new(&robot, &Parameters::default(), 1).is_ok());
+    for (name, range, change, values) in CASES {
+        for &value in *values {
+            let mut parameters = Parameters::default();
+            change(&mut parameters, value);
+            let refusal = Filter::new(&robot, &parameters, 1).err();
+            let said = refusal.map_or(String::new(), |refusal| refusal.to_string());
+            let told = format!("{name} is {value}, expected ");
+            assert!(
+                said.contains(&told) && said.contains(range),
+                "{name} = {value}: {said}"
+            );
+        }
+    }
+}
+
+#[test]
+fn no_parameter_of_the_filter_is_without_a_range() {
+    let choices = ["method", "paper.motion_model"];
+    for (name, _) in Settings::default().to_flat() {
+        let Some(name) = name.strip_prefix("filter.") else {
+            continue;
+        };
+        let has_range = CASES.iter().any(|case| case.0 == name);
+        assert!(has_range || choices.contains(&name), "{name}");
+    }
+}
+
+#[test]
+fn the_ends_of_a_range_are_within_it() {
+    let ends: [Change; 6] = [
+        |p, _| p.located_probability = 0.0,
+        |p, _| p.located_probability = 1.0,
+        |p, _| p.detector.off_torque = p.detector.on_torque,
+        |p, _| p.detector.smoothing_secs = 0.0,
+        |p, _| p.detector.release_secs = 0.0,
+        |p, _| p.paper.resample_below = 1.0,
+    ];
+    for change in ends {
+        let mut parameters = Parameters::default();
+        change(&mut parameters, 0.0);
+        assert!(parameters.check().is_ok(), "{parameters:?}");
+    }
+}
