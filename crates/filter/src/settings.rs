@@ -429,6 +429,22 @@ mod tests {
     }
 
     #[test]
+    fn the_shipped_file_has_every_parameter() {
+        let file: Value =
+            serde_yaml_ng::from_str(include_str!("../../../config/palpate.yaml")).unwrap();
+        for (name, _) in Settings::default().to_flat() {
+            let parameters = &file["/**"]["ros__parameters"];
+            let found = name
+                .split('.')
+                .try_fold(parameters, |section, key| section.get(key));
+            assert!(
+                found.is_some() || name == "robot_description",
+                "{name} is missing"
+            );
+        }
+    }
+
+    #[test]
     fn what_every_ros_node_is_given_is_skipped() {
         let given = [("qos_overrides./clock.depth".to_owned(), Value::from(1))];
         assert_eq!(Settings::from_flat(given).unwrap(), Settings::default());
