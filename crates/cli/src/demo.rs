@@ -37,7 +37,7 @@ pub struct Demo {
     /// Seed of the simulation and of the filter
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Number of particles [default: the parameters' default, 10000]
+    /// Number of particles [default: the parameters' default, 400]
     #[arg(long, value_name = "N")]
     particles: Option<usize>,
     /// Length of the contact, s
@@ -100,13 +100,14 @@ impl Demo {
         fs::create_dir_all(&self.out)
             .with_context(|| format!("cannot make the folder {}", self.out.display()))?;
         let mut settings = Settings::default();
-        settings.filter.particles = self.particles.unwrap_or(settings.filter.particles);
+        let hypotheses = &mut settings.filter.palpate.hypotheses;
+        *hypotheses = self.particles.unwrap_or(*hypotheses);
         table::print(&format!(
             "A simulated {} touches {} of an iiwa 14; torques with {} % noise, {} particles.\n",
             self.obstacle.word(),
             scenario.link,
             self.noise,
-            settings.filter.particles
+            settings.filter.palpate.hypotheses
         ))?;
         let told = self.follow(&robot, &trial, &settings)?;
         self.write(&robot, &trial, &told, &settings)?;
@@ -206,7 +207,7 @@ impl Demo {
                 "Simulated iiwa 14, a {} at {link}, {} % torque noise, {} particles, seed {}. {}",
                 self.obstacle.word(),
                 self.noise,
-                settings.filter.particles,
+                settings.filter.palpate.hypotheses,
                 self.seed,
                 told.summary()
             ),
