@@ -43,7 +43,6 @@ struct Seen {
     is_ambiguous: bool,
     /// Standard deviation of the first mode, m; NaN without one.
     std: f64,
-    holds: [bool; region::LEVELS.len()],
 }
 
 /// What a trial comes to.
@@ -83,14 +82,23 @@ pub fn score(
     mut see: impl FnMut(&JointSample, &Filter),
 ) -> Option<Score> {
     let start_ns = truth.first()?.stamp_ns;
+    let end_ns = truth.last()?.stamp_ns;
+    let mut holds = [false; region::LEVELS.len()];
     let mut intake = Intake::new(dof);
     let mut seen = Vec::with_capacity(truth.len());
     let mut waiting = truth.iter().peekable();
     let mut newest: Option<i64> = None;
+    let mut compared = |filter: &Filter, newest, known: &Known| {
+        let now = compare(filter.estimate(), newest, known, start_ns);
+        if known.stamp_ns == end_ns && now.error.is_finite() {
+            holds = region::holds(filter.estimate(), &known.point_in_root);
+        }
+        seen.push(now);
+    };
     for sample in samples {
         // Truth from before this sample belongs to the estimate that was there then.
         while let Some(known) = waiting.next_if(|known| known.stamp_ns < sample.stamp_ns) {
-            seen.push(compare(filter.estimate(), newest, known, start_ns));
+            compared(filter, newest, known);
         }
         if let Ok(admitted) = intake.admit(sample) {
             filter.update(admitted);
@@ -98,8 +106,8 @@ pub fn score(
             see(sample, filter);
         }
     }
-    seen.extend(waiting.map(|known| compare(filter.estimate(), newest, known, start_ns)));
-    summarise(&seen)
+    waiting.for_each(|known| compared(filter, newest, known));
+    summarise(&seen, holds)
 }
 
 fn compare(
@@ -123,13 +131,10 @@ fn compare(
         true_force: known.force,
         is_ambiguous: best.is_some() && estimate.status == ContactStatus::Ambiguous,
         std: best.map_or(f64::NAN, |mode| mode.std()),
-        holds: best.map_or_else(Default::default, |_| {
-            region::holds(estimate, known.link, &known.point_in_root)
-        }),
     }
 }
 
-fn summarise(seen: &[Seen]) -> Option<Score> {
+fn summarise(seen: &[Seen], holds: [bool; region::LEVELS.len()]) -> Option<Score> {
     let end = seen.last()?;
     let last: Vec<_> = (seen.iter())
         .filter(|s| s.secs >= end.secs - TAIL_SECS - 1e-9)
@@ -155,7 +160,7 @@ fn summarise(seen: &[Seen]) -> Option<Score> {
         without: share(seen.iter().map(|s| s.error.is_infinite())),
         ambiguous: share(last.iter().map(|s| s.is_ambiguous)),
         std: end.std,
-        holds: end.holds,
+        holds,
         course: course.filter_map(at).map(|s| s.error).collect(),
     })
 }
@@ -169,6 +174,8 @@ pub fn share(all: impl ExactSizeIterator<Item = bool>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const NO: [bool; region::LEVELS.len()] = [false; region::LEVELS.len()];
 
     /// Ten seconds at 10 Hz with these errors, m.
     fn seen(error_at: impl Fn(f64) -> f64) -> Vec<Seen> {
@@ -184,7 +191,6 @@ mod tests {
                     true_force: 10.0,
                     is_ambiguous: false,
                     std: 0.01,
-                    holds: [false, true],
                 }
             })
             .collect()
@@ -192,7 +198,7 @@ mod tests {
 
     #[test]
     fn the_last_second_and_the_time_to_settle_are_told_apart() {
-        let scored = summarise(&seen(|secs| if secs < 2.95 { 0.5 } else { 0.003 })).unwrap();
+        let scored = summarise(&seen(|secs| if secs < 2.95 { 0.5 } else { 0.003 }), NO).unwrap();
         assert_eq!(scored.error, 0.003);
         assert_eq!((scored.right_link, scored.right_link_all), (1.0, 0.7));
         assert!((scored.settled_secs - 3.0).abs() < 1e-9);
@@ -203,14 +209,14 @@ mod tests {
 
     #[test]
     fn what_is_never_found_never_settles() {
-        let scored = summarise(&seen(|secs| if secs < 9.85 { 0.003 } else { 0.5 })).unwrap();
+        let scored = summarise(&seen(|secs| if secs < 9.85 { 0.003 } else { 0.5 }), NO).unwrap();
         assert_eq!(scored.error, 0.003, "the median of the last second");
         assert_eq!(scored.settled_secs, f64::INFINITY);
-        let nothing = summarise(&seen(|_| f64::INFINITY)).unwrap();
+        let nothing = summarise(&seen(|_| f64::INFINITY), NO).unwrap();
         assert_eq!((nothing.error, nothing.without), (f64::INFINITY, 1.0));
         assert!(nothing.force_error.is_nan());
-        let at_once = summarise(&seen(|_| 0.001)).unwrap();
+        let at_once = summarise(&seen(|_| 0.001), NO).unwrap();
         assert_eq!(at_once.settled_secs, 0.0);
-        assert!(summarise(&[]).is_none());
+        assert!(summarise(&[], NO).is_none());
     }
 }

@@ -88,10 +88,9 @@ fn legend(view: View) -> String {
             "Median time from first contact after which the error stays below {} cm, s.",
             100.0 * FOUND
         ),
-        View::Calibration => format!(
-            "Share of trials whose true contact lies in the estimate's 50 % / 90 % region at the end; {}.",
-            super::region::MEANING
-        ),
+        View::Calibration => {
+            "Share of trials whose true contact lies in the estimate's 50 % / 90 % credible region at the end.".to_owned()
+        }
         View::RightLink => "Mean share of the last second that names the right link, %.".to_owned(),
         _ => {
             "Median over trials of the position error (median over the last second), mm.".to_owned()
