@@ -1,0 +1,86 @@
+//! What the README says of parameters, files and tests is so.
+
+// Helpers of tests may fail as tests do.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use palpate_filter::Settings;
+use serde_yaml_ng::Value;
+
+const README: &str = include_str!("../../../README.md");
+
+/// Rows of the parameter table: name, then type and default.
+fn rows() -> BTreeMap<&'static str, (&'static str, Value)> {
+    let (_, table) = README.split_once("| Parameter ").unwrap();
+    let lines = table
+        .lines()
+        .skip(2)
+        .take_while(|line| line.starts_with('|'));
+    lines
+        .map(|line| {
+            let cells: Vec<_> = line.split('|').map(str::trim).collect();
+            let default = cells[4].trim_matches('`');
+            let name = cells[1].trim_matches('`');
+            (name, (cells[2], serde_yaml_ng::from_str(default).unwrap()))
+        })
+        .collect()
+}
+
+fn type_of(value: &Value) -> &'static str {
+    match value {
+        Value::Bool(_) => "bool",
+        Value::Number(number) if number.is_f64() => "float",
+        Value::Number(_) => "integer",
+        Value::String(_) => "string",
+        Value::Sequence(values) if values.first().is_some_and(Value::is_f64) => "two floats",
+        Value::Sequence(_) => "strings",
+        other => panic!("no parameter is {other:?}"),
+    }
+}
+
+#[test]
+fn the_parameter_table_has_every_parameter_with_its_type_and_default() {
+    let said = rows();
+    let defaults: BTreeMap<_, _> = Settings::default().to_flat().into_iter().collect();
+    assert!(
+        said.keys().copied().eq(defaults.keys().map(String::as_str)),
+        "{said:#?}"
+    );
+    for (name, default) in &defaults {
+        assert_eq!(
+            said[name.as_str()],
+            (type_of(default), default.clone()),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn links_lead_to_files_and_name_the_tests_in_them() {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let mut tests = 0;
+    for (before, after) in README
+        .match_indices("](")
+        .map(|(at, _)| README.split_at(at))
+    {
+        let target = after[2..].split([')', '#']).next().unwrap();
+        if target.is_empty() || target.contains("://") {
+            continue;
+        }
+        assert!(root.join(target).exists(), "{target}");
+        let text = before.rsplit('[').next().unwrap().trim_matches('`');
+        let is_name =
+            |letter: char| letter.is_ascii_lowercase() || letter == '_' || letter.is_ascii_digit();
+        if text.contains('_') && text.chars().all(is_name) {
+            tests += 1;
+            let file = std::fs::read_to_string(root.join(target)).unwrap();
+            assert!(
+                file.contains(&format!(" {text}(")),
+                "{target} has no {text}"
+            );
+        }
+    }
+    assert!(tests > 0);
+}
