@@ -182,8 +182,12 @@ fn facts(
         (
             "samples",
             format!(
-                "{} used, {span_secs:.2} s; refused: {} for their stamp, {} not finite, {} of wrong length",
-                counts.admitted, counts.stamp_not_after, counts.not_finite, counts.wrong_length
+                "{} used, {span_secs:.2} s; refused: {} for their stamp, {} not finite, {} too large, {} of wrong length",
+                counts.admitted,
+                counts.stamp_not_after,
+                counts.not_finite,
+                counts.too_large,
+                counts.wrong_length
             ),
         ),
         (

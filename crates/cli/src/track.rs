@@ -92,7 +92,7 @@ pub fn track(
 
 /// Tells the first refusal; the others are counted.
 fn note(refusal: &Refusal, counts: IntakeCounts) {
-    if counts.wrong_length + counts.not_finite + counts.stamp_not_after == 1 {
+    if counts.refused() == 1 {
         tracing::warn!("sample refused: {refusal}; further ones are only counted");
     }
 }

@@ -33,28 +33,28 @@ impl DetectorParameters {
     pub(crate) fn check(&self) -> Result<(), ParameterError> {
         let check = ParameterError::check;
         check(
-            "detector.on_torque",
+            "filter.detector.on_torque",
             "> 0",
             self.on_torque,
             self.on_torque > 0.0,
         )?;
         let below = (0.0..=self.on_torque).contains(&self.off_torque);
         check(
-            "detector.off_torque",
+            "filter.detector.off_torque",
             "0 … on_torque",
             self.off_torque,
             below,
         )?;
         let smooth = (0.0..=10.0).contains(&self.smoothing_secs);
         check(
-            "detector.smoothing_secs",
+            "filter.detector.smoothing_secs",
             "0 … 10",
             self.smoothing_secs,
             smooth,
         )?;
         let release = (0.0..=60.0).contains(&self.release_secs);
         check(
-            "detector.release_secs",
+            "filter.detector.release_secs",
             "0 … 60",
             self.release_secs,
             release,
@@ -85,9 +85,9 @@ impl Detector {
 
     /// Takes the external torques of one sample, Nm; tells whether anything touches.
     pub(crate) fn update(&mut self, stamp_ns: i64, external_torque: &[f64]) -> bool {
-        let step_secs = self
-            .last_ns
-            .map_or(f64::INFINITY, |last| (stamp_ns - last) as f64 * 1e-9);
+        let step_secs = self.last_ns.map_or(f64::INFINITY, |last| {
+            stamp_ns.saturating_sub(last) as f64 * 1e-9
+        });
         self.last_ns = Some(stamp_ns);
         let gain = 1.0 - (-step_secs / self.parameters.smoothing_secs.max(1e-9)).exp();
         for (smoothed, torque) in self.smoothed.iter_mut().zip(external_torque) {

@@ -35,9 +35,9 @@ impl Estimator {
         }
     }
 
-    fn begin(&mut self, skin: &Skin, number: u64, count: usize) {
+    fn begin(&mut self) {
         match self {
-            Self::Paper(filter) => filter.begin(skin, number, count),
+            Self::Paper(filter) => filter.begin(),
             Self::Palpate(filter) => filter.begin(),
         }
     }
@@ -75,6 +75,7 @@ pub struct Filter {
     now: Kinematics,
     position_before: Vec<f64>,
     number: u64,
+    seed: u64,
     cloud: Vec<Particle>,
     estimate: ContactEstimate,
 }
@@ -100,6 +101,7 @@ impl Filter {
             now: Kinematics::new(robot),
             position_before: vec![0.0; robot.dof()],
             number: 0,
+            seed,
             cloud: Vec::with_capacity(count),
             estimate: ContactEstimate {
                 stamp_ns: 0,
@@ -125,10 +127,9 @@ impl Filter {
         self.estimate.modes.clear();
         if in_contact {
             if !was_in_contact {
-                self.before.clone_from(&self.now);
+                self.before.update(&self.robot, &sample.position);
                 self.position_before.copy_from_slice(&sample.position);
-                let count = self.parameters.particles;
-                self.estimator.begin(&self.skin, self.number, count);
+                self.estimator.begin();
             }
             let step = Step {
                 robot: &self.robot,
@@ -186,7 +187,9 @@ impl Filter {
 
     /// Forgets everything learned, as at the start.
     pub fn reset(&mut self) {
+        self.estimator = Estimator::new(&self.robot, &self.parameters, self.seed);
         self.detector.reset();
+        self.number = 0;
         self.cloud.clear();
         self.estimate.status = ContactStatus::NoContact;
         self.estimate.modes.clear();

@@ -2,6 +2,9 @@
 
 use palpate_model::JointSample;
 
+/// Largest position (rad, m) and torque (Nm, N) that is believed: larger ones would overflow when squared twice.
+const MOST: f64 = 1e9;
+
 /// Why a sample was refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
@@ -25,6 +28,18 @@ pub enum Refusal {
         /// The value found.
         value: f64,
     },
+    /// A value is beyond all that a robot can report.
+    #[error("{what} of joint {joint} is {value}, expected at most {most} in size")]
+    TooLarge {
+        /// Which array.
+        what: &'static str,
+        /// Index of the joint.
+        joint: usize,
+        /// Largest size allowed.
+        most: f64,
+        /// The value found.
+        value: f64,
+    },
     /// The stamp is not after the last one.
     #[error("stamp {found_ns} ns is not after the last one, {last_ns} ns")]
     StampNotAfter {
@@ -44,8 +59,17 @@ pub struct IntakeCounts {
     pub wrong_length: u64,
     /// Refused for NaN or infinity.
     pub not_finite: u64,
+    /// Refused for a value of absurd size.
+    pub too_large: u64,
     /// Refused for a stamp that does not advance.
     pub stamp_not_after: u64,
+}
+
+impl IntakeCounts {
+    /// All that were refused.
+    pub fn refused(&self) -> u64 {
+        self.wrong_length + self.not_finite + self.too_large + self.stamp_not_after
+    }
 }
 
 /// A sample that the filter can rely on: right lengths, finite values, a stamp after the last one.
@@ -87,6 +111,7 @@ impl Intake {
             Ok(()) => self.counts.admitted += 1,
             Err(Refusal::Length { .. }) => self.counts.wrong_length += 1,
             Err(Refusal::NotFinite { .. }) => self.counts.not_finite += 1,
+            Err(Refusal::TooLarge { .. }) => self.counts.too_large += 1,
             Err(Refusal::StampNotAfter { .. }) => self.counts.stamp_not_after += 1,
         }
         checked?;
@@ -125,12 +150,18 @@ fn check_values(what: &'static str, values: &[f64], expected: usize) -> Result<(
             found: values.len(),
         });
     }
-    match values.iter().position(|value| !value.is_finite()) {
-        Some(joint) => Err(Refusal::NotFinite {
-            what,
-            joint,
-            value: values[joint],
-        }),
-        None => Ok(()),
+    for (joint, &value) in values.iter().enumerate() {
+        if !value.is_finite() {
+            return Err(Refusal::NotFinite { what, joint, value });
+        }
+        if value.abs() > MOST {
+            return Err(Refusal::TooLarge {
+                what,
+                joint,
+                most: MOST,
+                value,
+            });
+        }
     }
+    Ok(())
 }

@@ -144,6 +144,8 @@ struct Sums {
     normal: Vector3<f64>,
     force: f64,
     stiffness: f64,
+    /// Weight and triangle of the heaviest particle.
+    heaviest: (f64, u32),
 }
 
 impl Sums {
@@ -155,6 +157,9 @@ impl Sums {
         self.normal += particle.normal_in_link.into_inner() * particle.weight;
         self.force += particle.force * particle.weight;
         self.stiffness += particle.stiffness * particle.weight;
+        if particle.weight >= self.heaviest.0 {
+            self.heaviest = (particle.weight, particle.triangle);
+        }
     }
 
     fn mode(
@@ -166,7 +171,7 @@ impl Sums {
     ) -> Mode {
         let total = self.weight.max(f64::MIN_POSITIVE);
         let mean = self.offset / total;
-        let on_surface = skin.surface(link).closest_point(&(centre + mean));
+        let on_surface = (skin.surface(link)).closest_point_from(&(centre + mean), self.heaviest.1);
         let fallback = skin.surface(link).normal(on_surface.triangle);
         let normal = Unit::try_new(self.normal, 1e-12 * total).unwrap_or(fallback);
         let root_from_link = kinematics.root_from_link(link);
@@ -203,11 +208,12 @@ impl Grid {
         );
         // One cell more on each side, so that a neighbour of any cell exists.
         let shape = [0, 1, 2].map(|axis| ((high[axis] - low[axis]) / CELL) as usize + 3);
+        let cells = shape.iter().product();
         Self {
             corner: low - Vector3::repeat(CELL),
             shape,
-            weight: vec![0.0; shape.iter().product()],
-            occupied: Vec::new(),
+            weight: vec![0.0; cells],
+            occupied: Vec::with_capacity(cells),
         }
     }
 

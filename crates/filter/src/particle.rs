@@ -9,6 +9,8 @@ pub struct Particle {
     pub link: usize,
     /// Contact point p in the link's frame, m.
     pub point_in_link: Point3<f64>,
+    /// Mesh triangle that p lies on.
+    pub triangle: u32,
     /// Outward normal n̂ of the surface at p in the link's frame.
     pub normal_in_link: Unit<Vector3<f64>>,
     /// Normal force F ≥ 0, N.

@@ -327,6 +327,7 @@ mod tests {
 
     fn particle(weight: f64) -> Particle {
         Particle {
+            triangle: 0,
             link: 1,
             point_in_link: Point3::new(0.1, 0.2, 0.3),
             normal_in_link: Vector3::y_axis(),

@@ -66,3 +66,14 @@ fn another_seed_differs() {
         assert!(one != other, "{method:?}");
     }
 }
+#[test]
+fn after_a_reset_a_filter_is_as_new() {
+    let robot = iiwa14(&LoadOptions::default()).unwrap();
+    for method in [Method::Paper, Method::Palpate] {
+        let mut filter = Filter::new(&robot, &small(method), 7).unwrap();
+        let first = told(&mut filter, &samples(&robot));
+        filter.reset();
+        let again = told(&mut filter, &samples(&robot));
+        assert!(first == again, "{method:?}");
+    }
+}

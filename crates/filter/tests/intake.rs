@@ -20,7 +20,7 @@ fn refusal(intake: &mut Intake, sample: &JointSample) -> Refusal {
 #[test]
 fn an_admitted_sample_is_the_one_that_came() {
     let mut intake = Intake::new(2);
-    let given = sample(-5, &[1.0, f64::MAX], &[f64::MIN_POSITIVE / 2.0, -0.0]);
+    let given = sample(-5, &[1.0, 1e9], &[f64::MIN_POSITIVE / 2.0, -0.0]);
     assert_eq!(intake.admit(&given).unwrap().sample(), &given);
 }
 
@@ -61,10 +61,12 @@ fn every_sample_is_counted_once() {
     let _ = intake.admit(&sample(4, &[], &[0.0]));
     let _ = intake.admit(&sample(5, &[f64::NAN], &[0.0]));
     let _ = intake.admit(&sample(6, &[0.0], &[f64::INFINITY]));
+    let _ = intake.admit(&sample(7, &[0.0], &[-1.1e9]));
     let expected = IntakeCounts {
         admitted: 3,
         wrong_length: 1,
         not_finite: 2,
+        too_large: 1,
         stamp_not_after: 2,
     };
     assert_eq!(intake.counts(), expected);

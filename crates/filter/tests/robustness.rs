@@ -273,3 +273,54 @@ fn a_chain_too_long_for_the_filter_is_refused_by_its_link() {
     let said = refusal.unwrap().to_string();
     assert!(said.contains("link_13") && said.contains("12"), "{said}");
 }
+fn constant(robot: &Robot, stamp_ns: i64, position: f64, torque: f64) -> JointSample {
+    JointSample {
+        stamp_ns,
+        position: vec![position; robot.dof()],
+        external_torque: vec![torque; robot.dof()],
+    }
+}
+
+fn survives_samples(robot: &Robot, samples: &[JointSample]) {
+    for method in [Method::Paper, Method::Palpate] {
+        let mut filter = Filter::new(robot, &fewest(method), 1).unwrap();
+        let mut intake = Intake::new(robot.dof());
+        for (index, sample) in samples.iter().enumerate() {
+            // Refusing it is fine as well.
+            if let Ok(admitted) = intake.admit(sample) {
+                let what = format!("{} {method:?} sample {index}", robot.name);
+                assert_sane_estimate(robot, filter.update(admitted), &what);
+                assert_sane_particles(robot, filter.particles(), &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_first_and_the_last_stamp_that_there_are() {
+    for torque in [0.0, 5.0] {
+        let robot = robots::hinge();
+        let at = |stamp_ns| constant(&robot, stamp_ns, 0.1, torque);
+        survives_samples(&robot, &[i64::MIN, 0, 10_000_000, i64::MAX].map(at));
+    }
+}
+
+#[test]
+fn the_largest_torques_that_there_are() {
+    let robot = robots::hinge();
+    for torque in [1e160, f64::MAX] {
+        let samples = (1..40).map(|index| constant(&robot, index * 10_000_000, 0.1, torque));
+        survives_samples(&robot, &samples.collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn the_largest_positions_that_there_are() {
+    for robot in [robots::slider(), robots::tree()] {
+        for far in [1e160, f64::MAX] {
+            let at = |index: i64| if index % 2 == 0 { far } else { -far };
+            let samples = (1..40).map(|index| constant(&robot, index * 10_000_000, at(index), 5.0));
+            survives_samples(&robot, &samples.collect::<Vec<_>>());
+        }
+    }
+}

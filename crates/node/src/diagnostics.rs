@@ -92,10 +92,7 @@ impl Diagnostics {
         let now = Before {
             messages,
             admitted: intake.admitted,
-            refused: refused_messages
-                + intake.wrong_length
-                + intake.not_finite
-                + intake.stamp_not_after,
+            refused: refused_messages + intake.refused(),
             lost,
         };
         let (level, message) = judge(&self.before, &now);
@@ -124,6 +121,7 @@ impl Diagnostics {
                 (messages.wrong_length + intake.wrong_length).to_string(),
             ),
             ("refused, not finite", intake.not_finite.to_string()),
+            ("refused, too large", intake.too_large.to_string()),
             (
                 "refused, stamp not after",
                 (messages.stamp_not_after + intake.stamp_not_after).to_string(),

@@ -108,7 +108,7 @@ impl Memory {
     pub(super) fn push(&mut self, stamp_ns: i64, position: &[f64], torque: &[f64]) {
         let filling = &mut self.filling;
         if let Some(last_ns) = filling.last_ns {
-            let period = (stamp_ns - last_ns) as f64 * 1e-9;
+            let period = stamp_ns.saturating_sub(last_ns) as f64 * 1e-9;
             // A gap is not the rate.
             self.period_secs += 0.05 * (period.min(0.2) - self.period_secs);
         }
@@ -150,7 +150,7 @@ impl Memory {
     pub(super) fn commit(&mut self, robot: &Robot) {
         let filling = &mut self.filling;
         let last_ns = filling.last_ns.unwrap_or(filling.first_ns);
-        let span = ((last_ns - filling.first_ns) as f64 * 1e-9).max(self.period_secs);
+        let span = (last_ns.saturating_sub(filling.first_ns) as f64 * 1e-9).max(self.period_secs);
         let mean = |sums: &[f64]| {
             sums.iter()
                 .map(|sum| sum / filling.samples)

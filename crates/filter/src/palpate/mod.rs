@@ -200,6 +200,7 @@ impl PalpateFilter {
                     Particle {
                         link,
                         point_in_link: touch.point,
+                        triangle: touch.triangle,
                         normal_in_link: touch.normal,
                         force: particle.evidence.force_at(touch.distance),
                         stiffness: particle.evidence.stiffness.max(0.0),

@@ -40,8 +40,19 @@ impl LinkLikelihood {
         normal: &Unit<Vector3<f64>>,
         force: f64,
     ) -> f64 {
-        let moment = point.coords.cross(normal);
-        let w = Vector6::new(normal.x, normal.y, normal.z, moment.x, moment.y, moment.z);
+        let w = wrench(point, normal);
         self.measured_squared + 2.0 * force * self.g.dot(&w) + force * force * w.dot(&(self.a * w))
     }
+
+    /// The force F ≥ 0 (N) against n̂ at p that leaves the least error.
+    pub(super) fn best_force(&self, point: &Point3<f64>, normal: &Unit<Vector3<f64>>) -> f64 {
+        let w = wrench(point, normal);
+        (-self.g.dot(&w) / w.dot(&(self.a * w)).max(f64::MIN_POSITIVE)).max(0.0)
+    }
+}
+
+/// w = \[n̂; p × n̂\].
+fn wrench(point: &Point3<f64>, normal: &Unit<Vector3<f64>>) -> Vector6<f64> {
+    let moment = point.coords.cross(normal);
+    Vector6::new(normal.x, normal.y, normal.z, moment.x, moment.y, moment.z)
 }

@@ -8,6 +8,7 @@ mod schedule;
 
 use nalgebra::Point3;
 use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 use crate::Particle;
@@ -21,6 +22,9 @@ use motion::LinkMotion;
 pub use motion::MotionModel;
 pub use parameters::PaperParameters;
 use schedule::Level;
+
+/// Relative spread of a fresh particle's force about the one that fits best.
+const FORCE_SPREAD: f64 = 0.2;
 
 /// The paper's state x = {n, p, F, K} of one particle, with its log weight.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +45,7 @@ pub(crate) struct State {
 /// The paper's particle filter.
 pub(crate) struct PaperFilter {
     parameters: PaperParameters,
+    count: usize,
     seed: u64,
     particles: Vec<State>,
     offspring: Vec<State>,
@@ -56,6 +61,7 @@ impl PaperFilter {
     pub(crate) fn new(parameters: PaperParameters, count: usize, links: usize, seed: u64) -> Self {
         Self {
             parameters,
+            count,
             seed,
             particles: Vec::with_capacity(count),
             offspring: Vec::with_capacity(count),
@@ -67,19 +73,20 @@ impl PaperFilter {
         }
     }
 
-    /// Spreads all particles over the whole skin, as at the start of a contact.
-    pub(crate) fn begin(&mut self, skin: &Skin, step: u64, count: usize) {
+    /// Forgets the last contact.
+    pub(crate) fn begin(&mut self) {
         self.travelled = 0.0;
-        let mut random = stream(self.seed, step, 0, Purpose::Spread);
         self.particles.clear();
-        self.particles
-            .extend((0..count).map(|_| spread(skin, &self.parameters, &mut random)));
     }
 
     /// One step: propagate, reweight, normalise, resample.
     pub(crate) fn step(&mut self, step: &Step) {
         self.travelled += step.joint_motion();
         let level = Level::at(&self.parameters, self.travelled);
+        self.condition(step);
+        if self.particles.is_empty() {
+            self.spread(step);
+        }
         self.propagate(step, &level);
         self.reweight(step, &level);
         normalise(
@@ -93,10 +100,23 @@ impl PaperFilter {
         }
     }
 
-    fn propagate(&mut self, step: &Step, level: &Level) {
+    /// Conditions the models on this sample: what all particles of a link share.
+    fn condition(&mut self, step: &Step) {
         for &link in step.skin.links() {
             self.motions[link] = LinkMotion::new(self.parameters.motion_model, step, link);
+            self.likelihoods[link] = LinkLikelihood::new(step, link);
         }
+    }
+
+    /// Spreads all particles over the whole skin, as at the start of a contact.
+    fn spread(&mut self, step: &Step) {
+        let mut random = stream(self.seed, step.number, 0, Purpose::Spread);
+        let (likelihoods, parameters) = (&self.likelihoods, &self.parameters);
+        let fresh = |_| fresh(step.skin, likelihoods, parameters, &mut random);
+        self.particles.extend((0..self.count).map(fresh));
+    }
+
+    fn propagate(&mut self, step: &Step, level: &Level) {
         let (motions, skin, seed, number) = (&self.motions, step.skin, self.seed, step.number);
         self.particles
             .par_chunks_mut(CHUNK)
@@ -111,9 +131,6 @@ impl PaperFilter {
     }
 
     fn reweight(&mut self, step: &Step, level: &Level) {
-        for &link in step.skin.links() {
-            self.likelihoods[link] = LinkLikelihood::new(step, link);
-        }
         let (likelihoods, skin) = (&self.likelihoods, step.skin);
         self.particles.par_chunks_mut(CHUNK).for_each(|particles| {
             for particle in particles {
@@ -145,7 +162,7 @@ impl PaperFilter {
         for particle in &mut self.offspring {
             particle.log_weight = 0.0;
             if random.random::<f64>() < self.parameters.fresh_share {
-                *particle = spread(step.skin, &self.parameters, &mut random);
+                *particle = fresh(step.skin, &self.likelihoods, &self.parameters, &mut random);
             }
         }
         std::mem::swap(&mut self.particles, &mut self.offspring);
@@ -157,6 +174,7 @@ impl PaperFilter {
         let show = |(state, &weight): (&State, &f64)| Particle {
             link: state.link as usize,
             point_in_link: state.point,
+            triangle: state.triangle,
             normal_in_link: skin.surface(state.link as usize).normal(state.triangle),
             force: state.force,
             stiffness: state.stiffness,
@@ -166,15 +184,24 @@ impl PaperFilter {
     }
 }
 
-/// A particle anywhere on the skin, uniform by area, with any force and stiffness of the ranges given.
-fn spread(skin: &Skin, parameters: &PaperParameters, random: &mut impl Rng) -> State {
+/// A particle anywhere on the skin, uniform by area, with a force about as large as the measured torques ask for there
+/// and any stiffness of the range given.
+fn fresh(
+    skin: &Skin,
+    likelihoods: &[LinkLikelihood],
+    parameters: &PaperParameters,
+    random: &mut impl Rng,
+) -> State {
     let (link, place) = skin.sample(random.random());
+    let normal = skin.surface(link).normal(place.triangle);
+    let best_force = likelihoods[link].best_force(&place.point, &normal);
+    let spread = 1.0 + FORCE_SPREAD * random.sample::<f64, _>(StandardNormal);
     let [low, high] = parameters.stiffness_range;
     State {
         link: link as u16,
         triangle: place.triangle,
         point: place.point,
-        force: parameters.force_max * random.random::<f64>(),
+        force: (best_force * spread).clamp(0.0, parameters.force_max),
         stiffness: low * (high / low).powf(random.random()),
         log_weight: 0.0,
     }

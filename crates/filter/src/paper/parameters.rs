@@ -63,6 +63,9 @@ impl PaperParameters {
                 check(name, "> 0", value, value > 0.0)?;
             }
         }
+        let [low, high] = self.stiffness_range;
+        let expected = "two values in ascending order";
+        check("filter.paper.stiffness_range", expected, high, low <= high)?;
         check(
             "filter.paper.schedule_travel",
             "> 0",
