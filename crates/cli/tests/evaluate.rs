@@ -186,6 +186,12 @@ fn recorded_trials_are_scored_like_simulated_ones() {
     // Stamps, links and frames agree: else nothing near this would come out.
     assert!(number(&scored[0], "error_m") < 0.05, "{scored:?}");
     assert_eq!(number(&scored[0], "right_link"), 1.0);
+
+    fs::write(path("set/one/truth.csv"), "t,link_name\n0,lbr_link_5\n").unwrap();
+    let output = evaluate(&arguments);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("no column link_index"), "{said}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Recorded trials: a folder of bags with the truth beside each.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -136,7 +137,7 @@ fn score_one(
     // The seed itself, so that `palpate replay` gives the same estimates.
     let mut filter = Filter::new(robot, &estimator.parameters(particles), seed)?;
     score(&mut filter, robot.dof(), &samples, &truth, |_, _| {})
-        .ok_or_else(|| Usage("its truth.csv has no row with contact".to_owned()).into())
+        .ok_or_else(|| wrong_truth("no row with contact").into())
 }
 
 /// A row of truth.csv.
@@ -149,34 +150,37 @@ struct TruthRow {
 }
 
 impl TruthRow {
-    fn read_all(text: &str) -> Result<Vec<Self>, Usage> {
+    fn read_all(text: &str) -> Result<Vec<Self>, Unreadable> {
         let mut lines = text.lines();
         let heads: Vec<_> = lines.next().unwrap_or_default().split(',').collect();
         let column = |name: &str| {
             let found = heads.iter().position(|head| head.trim() == name);
-            found.ok_or_else(|| Usage(format!("truth.csv has no column {name}")))
+            found.ok_or_else(|| wrong_truth(&format!("no column {name}")))
         };
         let link = column("link_name")?;
-        let numbers = ["t", "link_index", "px", "py", "pz", "force_N"].map(column);
+        let mut numbers = [0; 6];
+        for (place, name) in
+            numbers
+                .iter_mut()
+                .zip(["t", "link_index", "px", "py", "pz", "force_N"])
+        {
+            *place = column(name)?;
+        }
         let row = |(index, line): (usize, &str)| {
-            let cells: Vec<_> = line.split(',').collect();
-            let wrong = |what: &str| Usage(format!("truth.csv, line {}: {what}", index + 2));
+            let cells: Vec<_> = line.split(',').map(str::trim).collect();
+            let cell = |column: usize| cells.get(column).copied().unwrap_or_default();
             let mut values = [0.0; 6];
-            for (value, column) in values.iter_mut().zip(&numbers) {
-                let column = *column.as_ref().map_err(|usage| Usage(usage.0.clone()))?;
-                let cell = cells.get(column).copied().unwrap_or_default();
-                let number = cell.trim().parse().ok();
-                *value = number.ok_or_else(|| wrong(&format!("{cell:?} is not a number")))?;
+            for (value, &column) in values.iter_mut().zip(&numbers) {
+                *value = cell(column).parse().map_err(|_| {
+                    let (line, found) = (index + 2, cell(column));
+                    wrong_truth(&format!("line {line}: expected a number, found {found:?}"))
+                })?;
             }
             let [secs, number, x, y, z, force] = values;
             Ok(Self {
                 secs,
                 number: number as usize,
-                link: cells
-                    .get(link)
-                    .ok_or_else(|| wrong("too short"))?
-                    .trim()
-                    .to_owned(),
+                link: cell(link).to_owned(),
                 point_in_root: Point3::new(x, y, z),
                 force,
             })
@@ -186,6 +190,14 @@ impl TruthRow {
             .filter(|(_, line)| !line.trim().is_empty())
             .map(row)
             .collect()
+    }
+}
+
+/// A truth.csv that says nothing usable.
+fn wrong_truth(what: &str) -> Unreadable {
+    Unreadable {
+        path: "truth.csv".to_owned(),
+        source: io::Error::new(io::ErrorKind::InvalidData, what),
     }
 }
 
@@ -201,11 +213,8 @@ fn known(robot: &Robot, rows: &[TruthRow], samples: &[JointSample]) -> Result<Ve
         let link = robot.link_index(&row.link);
         let link = link.ok_or_else(|| {
             let links: Vec<_> = robot.links.iter().map(|link| link.name.as_str()).collect();
-            Usage(format!(
-                "truth.csv names link {}, the robot has {}",
-                row.link,
-                links.join(", ")
-            ))
+            let (found, known) = (&row.link, links.join(", "));
+            wrong_truth(&format!("it names link {found}, the robot has {known}"))
         })?;
         Ok(Known {
             stamp_ns: start_ns + (row.secs * 1e9).round() as i64,

@@ -133,7 +133,7 @@ impl<'a> Album<'a> {
         let robot = &self.setup.robot;
         let link = &robot.links[self.trial.link].name;
         Picture {
-            title: format!("{link} is touched; {} estimates", cell.estimator.title()),
+            title: format!("{link} is touched; method: {}", cell.estimator.title()),
             subtitle: format!(
                 "{condition}. Last second: {} mm from the truth.",
                 millimetres(score.error)
