@@ -24,8 +24,7 @@ impl Estimator {
         let count = parameters.particles;
         match parameters.method {
             Method::Paper => {
-                let filter =
-                    PaperFilter::new(parameters.paper.clone(), count, robot.links.len(), seed);
+                let filter = PaperFilter::new(robot, parameters.paper.clone(), count, seed);
                 Self::Paper(Box::new(filter))
             }
             Method::Palpate => {
@@ -44,7 +43,7 @@ impl Estimator {
 
     fn step(&mut self, step: &Step, stamp_ns: i64) {
         match self {
-            Self::Paper(filter) => filter.step(step),
+            Self::Paper(filter) => filter.step(step, stamp_ns),
             Self::Palpate(filter) => filter.step(step, stamp_ns),
         }
     }

@@ -1,5 +1,5 @@
 //! How far the paper's method comes on simulated contacts. It takes a contact for another one often enough that only
-//! statistics over some trials tell anything: the bounds keep it from getting worse, they do not praise it.
+//! medians over some trials tell anything.
 
 #![allow(clippy::unwrap_used)]
 
@@ -47,36 +47,28 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Measured: 6 of 10. The robot is more than a metre long: chance finds none.
-#[test]
-fn two_contacts_in_five_on_links_3_to_7_are_found_within_35_mm() {
+/// Median error over two contacts on each of links 3 to 7, m.
+fn median_error(model: MotionModel) -> f64 {
     let robot = iiwa14(&LoadOptions::default()).unwrap();
     let trials = (3..=7).flat_map(|link| (1..=2).map(move |seed| scenario(link, seed)));
-    let errors = trials.map(|trial| error(&robot, &trial, MotionModel::Curvature));
-    let errors: Vec<f64> = errors.collect();
-    let found = errors.iter().filter(|&&error| error < 0.035).count();
-    assert!(found >= 4, "{errors:.3?}");
+    median(trials.map(|trial| error(&robot, &trial, model)).collect())
 }
 
-/// Measured on four trials with more motion: curvature 23 mm, link 19 mm, world 18 mm on average.
+/// Measured: 8.5 mm. A larger sample, ten contacts a link at 10,000 particles, has a median of 10 mm, but 53 mm on link 3
+/// and 35 mm on link 7.
 #[test]
-fn on_link_3_the_curvature_model_is_not_much_worse_than_the_others() {
+fn contacts_on_links_3_to_7_are_located_within_two_centimetres_in_the_median() {
+    let error = median_error(MotionModel::Curvature);
+    assert!(error < 0.02, "{error}");
+}
+
+/// The paper's figure 4. Measured: curvature 9, link 85, world 78 mm.
+#[test]
+fn the_curvature_model_beats_a_contact_at_rest() {
     use MotionModel::{Curvature, Link, World};
-    let robot = iiwa14(&LoadOptions::default()).unwrap();
-    let mean = |model: MotionModel| {
-        let error = |seed| {
-            let scenario = Scenario {
-                joint_speed: 0.3,
-                travel: 0.06,
-                ..scenario(3, seed)
-            };
-            error(&robot, &scenario, model)
-        };
-        (1..=4).map(error).sum::<f64>() / 4.0
-    };
-    let [curvature, link, world] = [Curvature, Link, World].map(mean);
+    let [curvature, link, world] = [Curvature, Link, World].map(median_error);
     assert!(
-        curvature < link.min(world) + 0.015,
+        curvature < 0.7 * link.min(world),
         "{curvature} {link} {world}"
     );
 }

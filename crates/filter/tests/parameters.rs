@@ -70,6 +70,12 @@ const CASES: &[Case] = &[
         &[0.0, 101.0],
     ),
     (
+        "paper.rate_hz",
+        "10,000",
+        |p, v| p.paper.rate_hz = v,
+        &[0.0, -1.0, 10_001.0],
+    ),
+    (
         "paper.lambda",
         "> 0",
         |p, v| p.paper.lambda[0] = v,

@@ -93,7 +93,11 @@ impl Surface {
     /// Area of a triangle, m².
     pub fn triangle_area(&self, triangle: u32) -> f64 {
         let index = triangle as usize;
-        let before = if index == 0 { 0.0 } else { self.cumulative_area[index - 1] };
+        let before = if index == 0 {
+            0.0
+        } else {
+            self.cumulative_area[index - 1]
+        };
         self.cumulative_area[index] - before
     }
 

@@ -56,6 +56,7 @@ fn estimate(stamp_ns: i64) -> ContactEstimate {
 
 fn particle(index: usize) -> Particle {
     Particle {
+        triangle: 0,
         link: 1 + index % 2,
         point_in_link: Point3::new(0.0, 0.0, index as f64 * 0.01),
         normal_in_link: Vector3::x_axis(),

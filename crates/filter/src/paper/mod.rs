@@ -5,8 +5,10 @@ mod likelihood;
 mod motion;
 mod parameters;
 mod schedule;
+mod window;
 
 use nalgebra::Point3;
+use palpate_model::Robot;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
@@ -22,6 +24,7 @@ use motion::LinkMotion;
 pub use motion::MotionModel;
 pub use parameters::PaperParameters;
 use schedule::Level;
+use window::Window;
 
 /// Relative spread of a fresh particle's force about the one that fits best.
 const FORCE_SPREAD: f64 = 0.2;
@@ -55,10 +58,11 @@ pub(crate) struct PaperFilter {
     motions: Vec<LinkMotion>,
     /// How far the joints have moved since contact began, rad or m.
     travelled: f64,
+    window: Window,
 }
 
 impl PaperFilter {
-    pub(crate) fn new(parameters: PaperParameters, count: usize, links: usize, seed: u64) -> Self {
+    pub(crate) fn new(robot: &Robot, parameters: PaperParameters, count: usize, seed: u64) -> Self {
         Self {
             parameters,
             count,
@@ -67,9 +71,10 @@ impl PaperFilter {
             offspring: Vec::with_capacity(count),
             weights: Vec::with_capacity(count),
             chosen: Vec::with_capacity(count),
-            likelihoods: vec![LinkLikelihood::default(); links],
-            motions: vec![LinkMotion::default(); links],
+            likelihoods: vec![LinkLikelihood::default(); robot.links.len()],
+            motions: vec![LinkMotion::default(); robot.links.len()],
             travelled: 0.0,
+            window: Window::new(robot),
         }
     }
 
@@ -77,10 +82,23 @@ impl PaperFilter {
     pub(crate) fn begin(&mut self) {
         self.travelled = 0.0;
         self.particles.clear();
+        self.window.clear();
     }
 
-    /// One step: propagate, reweight, normalise, resample.
-    pub(crate) fn step(&mut self, step: &Step) {
+    /// Takes a sample in, and makes a step by the mean of the samples since the last one when it is time.
+    pub(crate) fn step(&mut self, sample: &Step, stamp_ns: i64) {
+        self.window.add(stamp_ns, sample.position, sample.torque);
+        if !self.particles.is_empty() && self.window.length_secs() < 1.0 / self.parameters.rate_hz {
+            return;
+        }
+        let mut window = std::mem::take(&mut self.window);
+        window.close(sample.robot, self.particles.is_empty());
+        self.update(&window.step(sample));
+        self.window = window;
+    }
+
+    /// One step of the filter: propagate, reweight, normalise, resample.
+    fn update(&mut self, step: &Step) {
         self.travelled += step.joint_motion();
         let level = Level::at(&self.parameters, self.travelled);
         self.condition(step);

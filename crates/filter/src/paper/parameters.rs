@@ -11,13 +11,15 @@ use crate::ParameterError;
 pub struct PaperParameters {
     /// What the contact does while the robot moves: `curvature`, `link` or `world`. Default `curvature`.
     pub motion_model: MotionModel,
-    /// λ of eq. 5, 1/(Nm)². Default 0.5, 10.
+    /// Steps a second, each by the mean of the samples since the last, Hz. Default 10, as the authors' own.
+    pub rate_hz: f64,
+    /// λ of eq. 5, 1/(Nm)². Default 1, 20.
     pub lambda: [f64; 2],
-    /// Noise σ on the location, m a step. Default 0.01, 0.002.
+    /// Noise σ on the location, m a step. Default 0.005, 0.0005.
     pub location_noise: [f64; 2],
-    /// Noise σ on the force, N a step. Default 3, 0.5.
+    /// Noise σ on the force, N a step. Default 1, 0.1.
     pub force_noise: [f64; 2],
-    /// Noise σ on the logarithm of the stiffness a step. Default 0.1, 0.02.
+    /// Noise σ on the logarithm of the stiffness a step. Default 0.1, 0.01.
     pub stiffness_noise: [f64; 2],
     /// Sum of the joints' motion over which the first values turn into the second, rad. Default 0.05.
     pub schedule_travel: f64,
@@ -35,10 +37,11 @@ impl Default for PaperParameters {
     fn default() -> Self {
         Self {
             motion_model: MotionModel::Curvature,
-            lambda: [0.5, 10.0],
-            location_noise: [0.01, 0.002],
-            force_noise: [3.0, 0.5],
-            stiffness_noise: [0.1, 0.02],
+            rate_hz: 10.0,
+            lambda: [1.0, 20.0],
+            location_noise: [0.005, 0.0005],
+            force_noise: [1.0, 0.1],
+            stiffness_noise: [0.1, 0.01],
             schedule_travel: 0.05,
             force_max: 80.0,
             stiffness_range: [500.0, 20_000.0],
@@ -63,6 +66,8 @@ impl PaperParameters {
                 check(name, "> 0", value, value > 0.0)?;
             }
         }
+        let rate = (0.1..=10_000.0).contains(&self.rate_hz);
+        check("filter.paper.rate_hz", "0.1 … 10,000", self.rate_hz, rate)?;
         let [low, high] = self.stiffness_range;
         let expected = "two values in ascending order";
         check("filter.paper.stiffness_range", expected, high, low <= high)?;
