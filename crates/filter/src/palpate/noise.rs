@@ -189,6 +189,12 @@ impl Noise {
         self.inflation = inflation;
     }
 
+    /// What the best hypothesis leaves of a keyframe's torque on one joint beyond the noise expected, Nm.
+    pub(super) fn unexplained(&self, keyframe: &Keyframe, joint: usize) -> f64 {
+        let expected = 1.0 / (self.weigh(keyframe, joint) * self.inflation[joint]);
+        ((self.inflation[joint] - 1.0) * expected).sqrt()
+    }
+
     /// Root mean square of a joint's torque, Nm.
     pub(super) fn rms(&self, joint: usize) -> f64 {
         self.power[joint].sqrt()

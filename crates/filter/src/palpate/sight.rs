@@ -6,8 +6,9 @@ use super::history::History;
 use super::obstacle::Obstacle;
 use super::peaks::{Peak, STEPS};
 
-/// Systematic error of the torques that is always reckoned with: a share of each joint's rms torque, and Nm. It
-/// stands for all that the model lacks: the mesh, stiffness that is not linear, delays, wrong masses.
+/// Systematic error of the torques that is always reckoned with: a share of each joint's rms torque, and Nm. With
+/// what the best hypothesis leaves unexplained, it stands for all that the model lacks: a mesh that is not the body,
+/// stiffness that is not linear, delays, wrong masses.
 const ERROR_SHARE: f64 = 0.02;
 const ERROR: f64 = 0.01;
 /// Precisions before any torque is seen: of a place on the link (1/m²), of the radius' logarithm, of a bar's
@@ -40,7 +41,9 @@ pub(super) fn sight(peak: &Peak, history: &History) -> Matrix3<f64> {
     for (row, derivatives) in columns.iter().enumerate() {
         let keyframe = &history.keyframes[history.keyframes.len() - 1 - row / link.path.len()];
         let joint = link.path[row % link.path.len()];
-        let sigma = ERROR + ERROR_SHARE * history.noise.rms(joint);
+        let sigma = ERROR
+            + ERROR_SHARE * history.noise.rms(joint)
+            + history.noise.unexplained(keyframe, joint);
         information +=
             derivatives * derivatives.transpose() * (keyframe.samples / (samples * sigma * sigma));
     }
