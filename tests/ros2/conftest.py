@@ -40,7 +40,7 @@ def start(domain, tmp_path):
 @pytest.fixture
 def node(start):
     """A node with the arm that ships with the project, and few particles."""
-    return start(**{"robot.description_file": URDF, "filter.particles": 1000})
+    return start(**{"robot.description_file": URDF, "filter.palpate.hypotheses": 100})
 
 
 @pytest.fixture(scope="session")
@@ -55,7 +55,7 @@ def bag(tmp_path_factory):
 def parameters(tmp_path_factory):
     """Few particles, for speed, and a wait so long that nothing is lost, however slow the machine is."""
     path = tmp_path_factory.mktemp("parameters") / "parameters.yaml"
-    values = {"filter.particles": PARTICLES, "input.max_wait_secs": 3600, "seed": 5}
+    values = {"filter.palpate.hypotheses": PARTICLES, "input.max_wait_secs": 3600, "seed": 5}
     lines = [f"    {name}: {value}" for name, value in values.items()]
     path.write_text("\n".join(["/**:", "  ros__parameters:", *lines]))
     return path

@@ -18,7 +18,7 @@ URDF = ROOT / "urdf" / "iiwa14.urdf"
 JOINTS = [f"lbr_A{number}" for number in range(1, 8)]
 LIMIT_SECS = 30.0
 # Of the tests with a simulated bag.
-PARTICLES = 2000
+PARTICLES = 200
 SAMPLES = 600
 
 _domains = itertools.count(os.getpid())

@@ -55,6 +55,14 @@ impl Default for Parameters {
 }
 
 impl Parameters {
+    /// Number of particles of the chosen method.
+    pub fn particle_count(&self) -> usize {
+        match self.method {
+            Method::Paper => self.particles,
+            Method::Palpate => self.palpate.hypotheses,
+        }
+    }
+
     /// Checks every range.
     ///
     /// # Errors

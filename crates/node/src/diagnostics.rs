@@ -50,7 +50,7 @@ impl Diagnostics {
                 node.fully_qualified_name()?.trim_start_matches('/')
             ),
             robot: robot.name.clone(),
-            particles: settings.filter.particles,
+            particles: settings.filter.particle_count(),
             seed: settings.seed,
             progress,
             clock: Clock::new(node, settings)?,
