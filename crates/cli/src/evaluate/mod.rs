@@ -62,7 +62,7 @@ pub struct Evaluate {
     /// The methods to measure: curvature, link, world (the paper's, by motion model), palpate [default: the experiment's]
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     methods: Vec<String>,
-    /// Number of the paper's particles and of palpate's hypotheses [default: the parameters' defaults, 10000 and 500]
+    /// Number of the paper's particles and of palpate's hypotheses [default: the parameters' defaults, 10000 and 400]
     #[arg(long, value_name = "N")]
     particles: Option<usize>,
     /// Length of a simulated trial, s

@@ -154,11 +154,11 @@ impl Noise {
         history: &History,
     ) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
-        obstacle.predict_newest(evidence, history, |predicted, joint, measured| {
+        obstacle.predict_newest(evidence, history, |predicted, joint, torque| {
             let weight = self.weigh(history.newest(), joint);
             // What the biases may be is no misfit.
             let bias = BIAS_SCALES[evidence.bias_scale].powi(2);
-            sum += (measured - predicted).powi(2) / (1.0 / weight + bias);
+            sum += (torque.measured - predicted).powi(2) / (1.0 / weight + bias);
             count += 1.0;
         });
         sum / f64::max(count, 1.0)

@@ -195,27 +195,11 @@ impl Obstacle {
         history: &History,
         mut take: impl FnMut(f64, usize, JointTorque),
     ) {
-        let link = self.link as usize;
-        let path = &history.robot.links[link].path;
         let mut newest = None;
-        self.follow(history.skin, history.keyframes, |index, keyframe, touch| {
+        self.follow(history.skin, history.keyframes, |index, _, touch| {
             let e = *newest.get_or_insert(touch.distance) - touch.distance;
             let force = evidence.force + evidence.stiffness * e;
-            let torques = joint_torques(
-                &keyframe.links[link],
-                keyframe,
-                index,
-                &touch,
-                path,
-                history.noise,
-            );
-            for (torque, &joint) in torques.zip(path) {
-                take(
-                    (torque.normal + evidence.friction * torque.tangential) * force,
-                    joint,
-                    torque,
-                );
-            }
+            self.predict_one(evidence, history, index, &touch, force, &mut take);
         });
     }
 
@@ -225,27 +209,32 @@ impl Obstacle {
         &self,
         evidence: &Evidence,
         history: &History,
-        mut take: impl FnMut(f64, usize, f64),
+        mut take: impl FnMut(f64, usize, JointTorque),
+    ) {
+        let touch = history.newest_touch(self);
+        let force = evidence.force_at(touch.distance);
+        let newest = history.keyframes.len() - 1;
+        self.predict_one(evidence, history, newest, &touch, force, &mut take);
+    }
+
+    /// The torques that a force at a touch makes in one keyframe.
+    fn predict_one(
+        &self,
+        evidence: &Evidence,
+        history: &History,
+        index: usize,
+        touch: &Touch,
+        force: f64,
+        take: &mut impl FnMut(f64, usize, JointTorque),
     ) {
         let link = self.link as usize;
         let path = &history.robot.links[link].path;
-        let keyframe = history.newest();
-        let touch = self.touch(history.skin, &keyframe.links[link].link_from_root);
-        let force = evidence.force_at(touch.distance);
-        let torques = joint_torques(
-            &keyframe.links[link],
-            keyframe,
-            0,
-            &touch,
-            path,
-            history.noise,
-        );
+        let keyframe = &history.keyframes[index];
+        let view = &keyframe.links[link];
+        let torques = joint_torques(view, keyframe, index, touch, path, history.noise);
         for (torque, &joint) in torques.zip(path) {
-            take(
-                (torque.normal + evidence.friction * torque.tangential) * force,
-                joint,
-                torque.measured,
-            );
+            let unit = torque.normal + evidence.friction * torque.tangential;
+            take(unit * force, joint, torque);
         }
     }
 }
