@@ -10,6 +10,7 @@ mod drawing;
 mod estimation;
 mod messages;
 mod parameters;
+mod reader;
 mod topics;
 
 use std::io::IsTerminal as _;

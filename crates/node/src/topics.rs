@@ -3,25 +3,20 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::Context as _;
-use futures::{FutureExt, Stream, StreamExt};
-use palpate_filter::{Filter, InputSettings, Settings};
+use palpate_filter::{Filter, Settings};
 use palpate_model::Robot;
-use palpate_node::{
-    JointInput, JointMessage, MessageError, Newest, Throttle, TimedSample, nanoseconds,
-};
+use palpate_node::Newest;
 use r2r::QosProfile;
-use r2r::sensor_msgs::msg::JointState;
 
 use crate::diagnostics::Diagnostics;
 use crate::drawing::{Easel, Pictures};
 use crate::estimation::{Estimation, Outputs, Progress};
-use crate::{messages, stopped};
+use crate::reader::Reader;
+use crate::stopped;
 
-/// Messages that the middleware keeps for a reader that is late.
-const DEPTH: usize = 100;
 /// Samples that wait for the filter at most, however young they are.
 const MOST_WAITING: usize = 10_000;
 
@@ -99,70 +94,5 @@ fn finish(work: Work, name: &'static str) -> anyhow::Result<()> {
     match work.join() {
         Ok(result) => result.with_context(|| format!("{name} cannot publish")),
         Err(_) => anyhow::bail!("{name} ended early, which is a fault of this program"),
-    }
-}
-
-/// Takes both topics in. Best effort, as that reads reliable and best-effort publishers alike.
-struct Reader {
-    positions: Box<dyn Stream<Item = JointState> + Unpin>,
-    torques: Box<dyn Stream<Item = JointState> + Unpin>,
-    input: JointInput,
-    samples: Arc<Newest<TimedSample>>,
-    max_wait_ns: i64,
-    complaints: Throttle,
-}
-
-impl Reader {
-    fn new(
-        node: &mut r2r::Node,
-        robot: Arc<Robot>,
-        settings: &InputSettings,
-        samples: Arc<Newest<TimedSample>>,
-    ) -> r2r::Result<Self> {
-        let qos = QosProfile::sensor_data().keep_last(DEPTH);
-        Ok(Self {
-            positions: Box::new(node.subscribe("joint_states", qos.clone())?),
-            torques: Box::new(node.subscribe("external_torque", qos)?),
-            input: JointInput::new(robot, settings),
-            samples,
-            max_wait_ns: nanoseconds(settings.max_wait_secs),
-            complaints: Throttle::new(Duration::from_secs(5)),
-        })
-    }
-
-    /// Takes all that has come: r2r itself would drop the newest.
-    fn drain(&mut self) {
-        while let Some(Some(message)) = self.positions.next().now_or_never() {
-            let taken = self
-                .input
-                .position(joint_message(&message, &message.position));
-            self.hand_on(taken);
-        }
-        while let Some(Some(message)) = self.torques.next().now_or_never() {
-            let taken = self.input.torque(joint_message(&message, &message.effort));
-            self.hand_on(taken);
-        }
-    }
-
-    fn hand_on(&mut self, taken: Result<(), MessageError>) {
-        if let Err(refusal) = taken
-            && let Some(more) = self.complaints.pass(Instant::now())
-        {
-            tracing::warn!("message refused (and {more} before): {refusal}");
-        }
-        while let Some(sample) = self.input.next_sample() {
-            let max_wait_ns = self.max_wait_ns;
-            let stale =
-                |oldest: &TimedSample, newest: &TimedSample| oldest.is_older(newest, max_wait_ns);
-            self.samples.push_over(sample, stale);
-        }
-    }
-}
-
-fn joint_message<'a>(message: &'a JointState, values: &'a [f64]) -> JointMessage<'a> {
-    JointMessage {
-        stamp_ns: messages::nanoseconds(&message.header.stamp),
-        names: &message.name,
-        values,
     }
 }
