@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ParameterError;
+use palpate_model::Robot;
+
+use crate::{ContactChange, ContactEvent, Detection, ParameterError};
 
 /// Parameters of the contact detector.
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
@@ -69,22 +71,42 @@ pub(crate) struct Detector {
     smoothed: Vec<f64>,
     last_ns: Option<i64>,
     quiet_secs: f64,
-    contact: bool,
+    /// The link that each joint moves.
+    moved: Vec<usize>,
+    /// How many joints move each joint's link: how far out it is.
+    depth: Vec<usize>,
+    detection: Detection,
 }
 
 impl Detector {
-    pub(crate) fn new(parameters: DetectorParameters, dof: usize) -> Self {
+    pub(crate) fn new(robot: &Robot, parameters: DetectorParameters) -> Self {
+        let moved: Vec<usize> = (0..robot.dof())
+            .map(|joint| {
+                let moves = |link: &palpate_model::Link| link.joint == Some(joint);
+                robot.links.iter().position(moves).unwrap_or(0)
+            })
+            .collect();
         Self {
             parameters,
-            smoothed: vec![0.0; dof],
+            smoothed: vec![0.0; robot.dof()],
             last_ns: None,
             quiet_secs: 0.0,
-            contact: false,
+            depth: (moved.iter().map(|&link| robot.links[link].path.len())).collect(),
+            moved,
+            detection: Detection {
+                joints: vec![false; robot.dof()],
+                ..Detection::default()
+            },
         }
     }
 
-    /// Takes the external torques of one sample, Nm; tells whether anything touches.
-    pub(crate) fn update(&mut self, stamp_ns: i64, external_torque: &[f64]) -> bool {
+    /// What the last update found.
+    pub(crate) fn detection(&self) -> &Detection {
+        &self.detection
+    }
+
+    /// Takes the external torques of one sample, Nm, in.
+    pub(crate) fn update(&mut self, stamp_ns: i64, external_torque: &[f64]) {
         let step_secs = self.last_ns.map_or(f64::INFINITY, |last| {
             stamp_ns.saturating_sub(last) as f64 * 1e-9
         });
@@ -97,43 +119,87 @@ impl Detector {
             .smoothed
             .iter()
             .fold(0.0_f64, |most, torque| most.max(torque.abs()));
-        if largest >= self.parameters.on_torque {
-            self.contact = true;
-        }
         let quiet = largest < self.parameters.off_torque && step_secs.is_finite();
         self.quiet_secs = if quiet {
             self.quiet_secs + step_secs
         } else {
             0.0
         };
-        if self.quiet_secs > self.parameters.release_secs {
-            self.contact = false;
+        self.detection.event = None;
+        if !self.detection.in_contact && largest >= self.parameters.on_torque {
+            self.change(ContactChange::Start, stamp_ns);
         }
-        self.contact
+        if self.detection.in_contact && self.quiet_secs > self.parameters.release_secs {
+            self.change(ContactChange::End, stamp_ns);
+        }
+        self.note_joints();
+    }
+
+    fn change(&mut self, change: ContactChange, stamp_ns: i64) {
+        let starts = change == ContactChange::Start;
+        self.detection.in_contact = starts;
+        self.detection.since_ns = starts.then_some(stamp_ns);
+        self.detection.first_link = None;
+        self.detection.confidence = f64::from(starts);
+        self.detection.event = Some(ContactEvent {
+            change,
+            stamp_ns,
+            noticed_ns: stamp_ns,
+            confidence: 1.0,
+        });
+    }
+
+    fn note_joints(&mut self) {
+        let in_contact = self.detection.in_contact;
+        for (feels, smoothed) in self.detection.joints.iter_mut().zip(&self.smoothed) {
+            *feels = in_contact && smoothed.abs() >= self.parameters.on_torque;
+        }
+        let felt = (self.detection.joints.iter().enumerate()).filter(|(_, feels)| **feels);
+        let last = felt
+            .map(|(joint, _)| joint)
+            .max_by_key(|&joint| self.depth[joint]);
+        let known = self.detection.first_link;
+        self.detection.first_link = last.map(|joint| self.moved[joint]).or(known);
     }
 
     pub(crate) fn reset(&mut self) {
         self.smoothed.fill(0.0);
         self.last_ns = None;
         self.quiet_secs = 0.0;
-        self.contact = false;
+        self.detection.joints.fill(false);
+        self.detection = Detection {
+            joints: std::mem::take(&mut self.detection.joints),
+            ..Detection::default()
+        };
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use palpate_model::{EmbeddedMeshes, LoadOptions};
+
     use super::*;
 
+    const URDF: &str = r#"<robot name="two"><link name="base"/><link name="a"/><link name="b"/>
+        <joint name="j1" type="continuous"><parent link="base"/><child link="a"/></joint>
+        <joint name="j2" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"#;
+
+    fn detector() -> Detector {
+        let (robot, _) =
+            Robot::from_urdf(URDF, &EmbeddedMeshes(&[]), &LoadOptions::default()).unwrap();
+        Detector::new(&robot, DetectorParameters::default())
+    }
+
     fn run(detector: &mut Detector, from_ms: i64, to_ms: i64, torque: f64) -> bool {
-        (from_ms..to_ms)
-            .map(|ms| detector.update(ms * 1_000_000, &[0.0, torque]))
-            .last()
-            .unwrap()
+        for ms in from_ms..to_ms {
+            detector.update(ms * 1_000_000, &[0.0, torque]);
+        }
+        detector.detection().in_contact
     }
 
     #[test]
     fn contact_begins_above_one_threshold_and_ends_below_another() {
-        let mut detector = Detector::new(DetectorParameters::default(), 2);
+        let mut detector = detector();
         assert!(!run(&mut detector, 0, 500, 0.25));
         assert!(run(&mut detector, 500, 1000, -0.4));
         assert!(

@@ -9,8 +9,10 @@ use crate::palpate::{MOST_JOINTS, PalpateFilter};
 use crate::paper::PaperFilter;
 use crate::skin::Skin;
 use crate::step::Step;
+use crate::tare::Tare;
 use crate::{
-    Admitted, ContactEstimate, ContactStatus, Method, Mode, ParameterError, Parameters, Particle,
+    Admitted, ContactEstimate, ContactStatus, Detection, JointBias, Method, Mode, ParameterError,
+    Parameters, Particle, TareRefusal, TareState,
 };
 
 /// The method chosen, with all that it knows of the present contact.
@@ -68,6 +70,10 @@ pub struct Filter {
     skin: Skin,
     parameters: Parameters,
     detector: Detector,
+    tare: Tare,
+    bias: Vec<JointBias>,
+    /// External torques of the last sample without bias, Nm.
+    torque: Vec<f64>,
     estimator: Estimator,
     modes: ModeFinder,
     before: Kinematics,
@@ -93,7 +99,10 @@ impl Filter {
         check_paths(robot)?;
         let count = parameters.particles;
         Ok(Self {
-            detector: Detector::new(parameters.detector.clone(), robot.dof()),
+            detector: Detector::new(robot, parameters.detector.clone()),
+            tare: Tare::new(robot.dof()),
+            bias: vec![JointBias::default(); robot.dof()],
+            torque: vec![0.0; robot.dof()],
             estimator: Estimator::new(robot, parameters, seed),
             modes: ModeFinder::new(robot, &skin),
             before: Kinematics::new(robot),
@@ -119,9 +128,10 @@ impl Filter {
         std::mem::swap(&mut self.before, &mut self.now);
         self.now.update(&self.robot, &sample.position);
         let was_in_contact = self.estimate.status != ContactStatus::NoContact;
-        let in_contact = self
-            .detector
-            .update(sample.stamp_ns, &sample.external_torque);
+        self.take_bias_out(&sample.external_torque);
+        self.detector.update(sample.stamp_ns, &self.torque);
+        let in_contact = self.detector.detection().in_contact;
+        self.carry_tare_on(sample.stamp_ns, &sample.external_torque);
         self.cloud.clear();
         self.estimate.modes.clear();
         if in_contact {
@@ -137,7 +147,8 @@ impl Filter {
                 now: &self.now,
                 position_before: &self.position_before,
                 position: &sample.position,
-                torque: &sample.external_torque,
+                torque: &self.torque,
+                bias: &self.bias,
                 number: self.number,
             };
             self.estimator.step(&step, sample.stamp_ns);
@@ -169,6 +180,58 @@ impl Filter {
         };
     }
 
+    fn take_bias_out(&mut self, external_torque: &[f64]) {
+        for ((torque, measured), bias) in
+            (self.torque.iter_mut().zip(external_torque)).zip(&self.bias)
+        {
+            *torque = measured - bias.mean;
+        }
+    }
+
+    /// The tare takes torques in as they are measured, with the bias.
+    fn carry_tare_on(&mut self, stamp_ns: i64, external_torque: &[f64]) {
+        if self.detector.detection().in_contact {
+            self.tare.interrupt();
+        } else if self.tare.take(stamp_ns, external_torque) {
+            for (joint, bias) in self.bias.iter_mut().enumerate() {
+                *bias = self.tare.bias(joint);
+            }
+        }
+    }
+
+    /// Begins to tare: the mean of each joint's torque over the next `secs` (0.1 to 60 s) becomes its bias. The robot
+    /// should rest, and nothing touch it; see [`Filter::tare_state`] for how it goes.
+    ///
+    /// # Errors
+    /// If something touches, or the time is out of range.
+    pub fn start_tare(&mut self, secs: f64) -> Result<(), TareRefusal> {
+        if let Some(since_ns) = self.detector.detection().since_ns {
+            return Err(TareRefusal::InContact { since_ns });
+        }
+        self.tare.start(secs)
+    }
+
+    /// Forgets the bias, tared or learned: the torques count as they are measured.
+    pub fn clear_tare(&mut self) {
+        self.tare.clear();
+        self.bias.fill(JointBias::default());
+    }
+
+    /// How far the last commanded tare is.
+    pub fn tare_state(&self) -> TareState {
+        self.tare.state()
+    }
+
+    /// The bias of each joint's external torque, tared or learned.
+    pub fn bias(&self) -> &[JointBias] {
+        &self.bias
+    }
+
+    /// Whether anything touched at the last update, and what the torques tell of it without the estimate.
+    pub fn detection(&self) -> &Detection {
+        self.detector.detection()
+    }
+
     /// The estimate after the last update.
     pub fn estimate(&self) -> &ContactEstimate {
         &self.estimate
@@ -188,6 +251,7 @@ impl Filter {
     pub fn reset(&mut self) {
         self.estimator = Estimator::new(&self.robot, &self.parameters, self.seed);
         self.detector.reset();
+        self.clear_tare();
         self.number = 0;
         self.cloud.clear();
         self.estimate.status = ContactStatus::NoContact;

@@ -1,5 +1,7 @@
 //! Where the contact is: a particle filter over the triangles of each link's mesh.
 
+mod bias;
+mod detection;
 mod detector;
 mod estimate;
 mod filter;
@@ -16,7 +18,10 @@ mod scene;
 mod settings;
 mod skin;
 mod step;
+mod tare;
 
+pub use bias::JointBias;
+pub use detection::{ContactChange, ContactEvent, Detection};
 pub use detector::DetectorParameters;
 pub use estimate::{ContactEstimate, ContactStatus, Mode};
 pub use filter::Filter;
@@ -31,3 +36,4 @@ pub use scene::{
     ContactPose, Label, Scene, pack_cloud,
 };
 pub use settings::{InputSettings, RobotSettings, Settings, SettingsError, VizSettings};
+pub use tare::{TareRefusal, TareState};

@@ -2,6 +2,7 @@
 
 use palpate_model::{Kinematics, Robot};
 
+use crate::JointBias;
 use crate::skin::Skin;
 
 /// The inputs of one filter step.
@@ -18,8 +19,10 @@ pub(crate) struct Step<'a> {
     pub(crate) position_before: &'a [f64],
     /// Joint positions at this sample, rad or m.
     pub(crate) position: &'a [f64],
-    /// External torques at this sample, Nm or N.
+    /// External torques at this sample without their bias, Nm or N.
     pub(crate) torque: &'a [f64],
+    /// The bias taken out of each joint's torque, and how uncertain it is, Nm or N; it stays as it is in contact.
+    pub(crate) bias: &'a [JointBias],
     /// Number of the sample since the filter began; keys the random streams.
     pub(crate) number: u64,
 }
