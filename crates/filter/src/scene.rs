@@ -308,6 +308,7 @@ mod tests {
             parent_from_rest: Isometry3::translation(0.0, 0.0, 1.0),
             joint,
             path,
+            inertial: None,
             mesh: None,
         };
         Robot {

@@ -79,6 +79,23 @@ pub enum ModelError {
         /// The number or numbers.
         found: String,
     },
+    /// A link moves and has no mass.
+    #[error(
+        "link `{link}`: expected a mass and an inertia in the URDF, as it moves, found none: without them no external \
+         torque can be told from measured ones"
+    )]
+    NoInertia {
+        /// The link.
+        link: String,
+    },
+    /// The payload is carried by a link that is not in the URDF.
+    #[error("the payload: expected one of the links {known}, found `{found}`")]
+    PayloadLink {
+        /// The name that no link has.
+        found: String,
+        /// Names that the robot has.
+        known: String,
+    },
     /// The geometry of a link could not be loaded.
     #[error("link `{link}`, {geometry}: {source}")]
     Geometry {

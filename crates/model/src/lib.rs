@@ -1,13 +1,16 @@
-//! What the robot is: its joints and links from a URDF, their meshes, how they move, and the surfaces that can be
-//! touched.
+//! What the robot is: its joints and links from a URDF, their meshes, how they move, what torque that takes, and the
+//! surfaces that can be touched.
 //!
-//! The model never changes after it is built; the results for one configuration are another value ([`Kinematics`]).
+//! The model never changes after it is built; the results for one configuration are another value ([`Kinematics`],
+//! [`DynamicsWorkspace`]).
 //! Transforms are named `a_from_b`, quantities `x_in_a`; units are SI, angles radians, stamps integer nanoseconds.
 
 mod adjacency;
 mod clean;
+mod dynamics;
 mod error;
 mod iiwa14;
+mod inertial;
 mod joint_map;
 mod kinematics;
 mod link_mesh;
@@ -28,8 +31,10 @@ mod triangle;
 mod urdf;
 
 pub use clean::Cleaning;
+pub use dynamics::{Dynamics, DynamicsWorkspace, Momentum};
 pub use error::ModelError;
 pub use iiwa14::{IIWA14_MESHES, IIWA14_URDF, iiwa14};
+pub use inertial::{Inertial, Payload, inertia_matrix};
 pub use joint_map::JointMap;
 pub use kinematics::Kinematics;
 pub use load::{Geometry, LinkReport, LoadOptions, LoadReport};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::TriangleMesh;
+use crate::{Inertial, TriangleMesh};
 
 /// How a movable joint moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,7 +54,7 @@ impl Joint {
     }
 }
 
-/// A link: its place in the tree and its geometry.
+/// A link: its place in the tree, its mass and its geometry.
 #[derive(Clone, Debug)]
 pub struct Link {
     /// Name in the URDF.
@@ -68,6 +68,8 @@ pub struct Link {
     /// Indices of the movable joints between the root and this link, from the root outwards: the only joints that
     /// feel a contact on this link.
     pub path: Vec<usize>,
+    /// Mass and inertia; none where the URDF gives none.
+    pub inertial: Option<Inertial>,
     /// What can be touched, in this link's frame; none where the URDF gives no geometry.
     pub mesh: Option<TriangleMesh>,
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Unit, Vector3};
 
 use crate::tree::Tree;
-use crate::{Geometry, Joint, JointKind, JointLimits, Link, LoadOptions, LoadReport};
+use crate::{Geometry, Inertial, Joint, JointKind, JointLimits, Link, LoadOptions, LoadReport};
 use crate::{MeshFiles, MeshSource, ModelError, Robot, link_mesh};
 
 /// Deepest nesting of elements in a URDF. The format itself needs five.
@@ -83,6 +83,7 @@ impl Robot {
             parent_from_rest: Isometry3::identity(),
             joint: None,
             path: Vec::new(),
+            inertial: inertial(link)?,
             mesh: None,
         };
         if let Some(above) = joint_above {
@@ -100,6 +101,12 @@ impl Robot {
         self.links.push(new);
         Ok(())
     }
+}
+
+fn inertial(link: &urdf_rs::Link) -> Result<Option<Inertial>, ModelError> {
+    let name = format!("link `{}` inertial origin", link.name);
+    let link_from_inertial = link_mesh::pose(&name, &link.inertial.origin)?;
+    Inertial::of_urdf(&link.name, &link.inertial, &link_from_inertial)
 }
 
 /// The joint types that the format knows.

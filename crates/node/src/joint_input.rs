@@ -260,6 +260,7 @@ mod tests {
             parent_from_rest: Isometry3::identity(),
             joint: None,
             path: Vec::new(),
+            inertial: None,
             mesh: None,
         };
         let robot = Robot {

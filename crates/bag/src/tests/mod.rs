@@ -30,6 +30,7 @@ fn arm() -> Robot {
         parent_from_rest: Isometry3::translation(0.0, 0.1, 0.3),
         joint: index.checked_sub(1),
         path: (0..index).collect(),
+        inertial: None,
         mesh: None,
     };
     Robot {
