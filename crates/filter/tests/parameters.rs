@@ -2,8 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-use palpate_filter::{Filter, Parameters, Settings};
+use palpate_filter::{Filter, PARAMETER_TABLE, Parameters, Settings, SettingsError};
 use palpate_model::{LoadOptions, iiwa14};
+use serde_yaml_ng::Value;
 
 type Change = fn(&mut Parameters, f64);
 
@@ -200,5 +201,53 @@ fn the_ends_of_a_range_are_within_it() {
         let mut parameters = Parameters::default();
         change(&mut parameters, 0.0);
         assert!(parameters.check().is_ok(), "{parameters:?}");
+    }
+}
+
+/// Settings with one parameter changed; a pair gets twice the same value.
+fn with(name: &str, value: f64) -> Result<Settings, SettingsError> {
+    let mut flat = Settings::default().to_flat();
+    let entry = flat.iter_mut().find(|entry| entry.0 == name).unwrap();
+    entry.1 = match &entry.1 {
+        Value::Sequence(_) => vec![Value::from(value); 2].into(),
+        Value::Number(number) if number.is_i64() || number.is_u64() => (value as i64).into(),
+        _ => value.into(),
+    };
+    Settings::from_flat(flat)
+}
+
+#[test]
+fn the_bounds_in_the_table_are_those_that_are_checked() {
+    for row in PARAMETER_TABLE {
+        let Some([least, most]) = row.bounds else {
+            continue;
+        };
+        let refused = |value| {
+            let said = with(row.name, value).err().map(|error| error.to_string());
+            said.is_some_and(|said| said.contains(row.name))
+        };
+        assert!(refused(least - 1.0), "{} below {least}", row.name);
+        if most < f64::MAX {
+            assert!(refused(most + 1.0), "{} above {most}", row.name);
+            assert!(with(row.name, most).is_ok(), "{} = {most}", row.name);
+        }
+        let excluded = row.range.starts_with('>');
+        assert_eq!(refused(least), excluded, "{} = {least}", row.name);
+    }
+}
+
+#[test]
+fn a_number_without_bounds_in_the_table_is_none() {
+    for (row, (name, value)) in PARAMETER_TABLE.iter().zip(Settings::default().to_flat()) {
+        assert_eq!(
+            row.name, name,
+            "the table is not in the order of the settings"
+        );
+        let is_number = |value: &Value| value.is_number();
+        let numeric = is_number(&value)
+            || value
+                .as_sequence()
+                .is_some_and(|list| list.iter().any(is_number));
+        assert_eq!(row.bounds.is_some(), numeric, "{name}");
     }
 }

@@ -3,29 +3,23 @@
 // Helpers of tests may fail as tests do.
 #![allow(clippy::unwrap_used)]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use palpate_filter::Settings;
+use palpate_filter::{PARAMETER_TABLE, Settings};
 use serde_yaml_ng::Value;
 
 const README: &str = include_str!("../../../README.md");
 
-/// Rows of the parameter table: name, then type and default.
-fn rows() -> BTreeMap<&'static str, (&'static str, Value)> {
+/// Cells of the parameter table's rows.
+fn rows() -> Vec<Vec<&'static str>> {
     let (_, table) = README.split_once("| Parameter ").unwrap();
     let lines = table
         .lines()
         .skip(2)
         .take_while(|line| line.starts_with('|'));
-    lines
-        .map(|line| {
-            let cells: Vec<_> = line.split('|').map(str::trim).collect();
-            let default = cells[4].trim_matches('`');
-            let name = cells[1].trim_matches('`');
-            (name, (cells[2], serde_yaml_ng::from_str(default).unwrap()))
-        })
-        .collect()
+    let cells = |line: &'static str| line.trim_matches('|').split('|').map(str::trim).collect();
+    lines.map(cells).collect()
 }
 
 fn type_of(value: &Value) -> &'static str {
@@ -44,17 +38,27 @@ fn type_of(value: &Value) -> &'static str {
 fn the_parameter_table_has_every_parameter_with_its_type_and_default() {
     let said = rows();
     let defaults: BTreeMap<_, _> = Settings::default().to_flat().into_iter().collect();
+    let names: BTreeSet<_> = said.iter().map(|row| row[0].trim_matches('`')).collect();
     assert!(
-        said.keys().copied().eq(defaults.keys().map(String::as_str)),
+        names.iter().eq(defaults.keys()) && said.len() == names.len(),
         "{said:#?}"
     );
-    for (name, default) in &defaults {
+    for (row, expected) in said.iter().zip(PARAMETER_TABLE) {
+        let [name, kind, unit, default, range, live, meaning] = row[..] else {
+            panic!("{row:?}");
+        };
+        assert_eq!(name.trim_matches('`'), expected.name);
+        let value = &defaults[expected.name];
+        let default: Value = serde_yaml_ng::from_str(default.trim_matches('`')).unwrap();
+        assert_eq!((kind, &default), (type_of(value), value), "{name}");
+        let live_word = if expected.live { "yes" } else { "no" };
         assert_eq!(
-            said[name.as_str()],
-            (type_of(default), default.clone()),
+            [unit, range, live, meaning],
+            [expected.unit, expected.range, live_word, expected.meaning],
             "{name}"
         );
     }
+    assert_eq!(said.len(), PARAMETER_TABLE.len());
 }
 
 #[test]
