@@ -42,5 +42,5 @@ pub use mesh::{EdgeCount, TriangleMesh};
 pub use mesh_source::{EmbeddedMeshes, MeshFiles, MeshSource};
 pub use pairing::{Pairing, PairingLosses};
 pub use robot::{Joint, JointKind, JointLimits, Link, Robot};
-pub use sample::JointSample;
+pub use sample::{JointSample, MeasuredSample};
 pub use surface::{Surface, SurfacePoint};

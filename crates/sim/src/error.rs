@@ -46,6 +46,9 @@ pub enum SimError {
         /// What is wrong.
         reason: String,
     },
+    /// The robot's masses are no ground for dynamics.
+    #[error(transparent)]
+    Model(#[from] palpate_model::ModelError),
     /// Every draw of configuration, obstacle and motion was refused.
     #[error("no contact of a {obstacle} with link {link} in {draws} draws; refused: {reasons}")]
     NoContact {

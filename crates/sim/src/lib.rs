@@ -5,8 +5,12 @@
 //! distances come from parry, the torques from the sum of cross products on the joint axes, and by default the touched
 //! link's mesh is a refined, rounder one than the robot's own ([`refine`]).
 //!
-//! Everything follows from the [`Scenario`] and its seed.
+//! A [`Drive`] is the other kind of trial: an arm that moves far and fast, with gravity, inertia and friction in its measured
+//! torques, and is pushed now and then.
+//!
+//! Everything follows from the [`Scenario`] or [`DriveScenario`] and its seed.
 
+mod drive;
 mod error;
 mod motion;
 mod noise;
@@ -20,6 +24,7 @@ mod torque;
 mod trial;
 mod truth;
 
+pub use drive::{Drive, DriveMoment, DriveScenario, Push, TruePush};
 pub use error::SimError;
 pub use obstacle::{Obstacle, ObstacleKind};
 pub use remesh::{coarsen, refine};

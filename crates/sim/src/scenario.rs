@@ -169,22 +169,7 @@ impl Scenario {
                 found: format!("{} values", self.bias.len()),
             });
         }
-        let link = robot.link_index(&self.link);
-        let link = link.ok_or_else(|| SimError::UnknownLink {
-            link: self.link.clone(),
-            known: names(robot, |_| true),
-        })?;
-        if robot.links[link].mesh.is_none() {
-            return Err(SimError::NoMesh {
-                link: self.link.clone(),
-                known: names(robot, |index| robot.links[index].mesh.is_some()),
-            });
-        }
-        if robot.links[link].path.is_empty() {
-            let link = self.link.clone();
-            return Err(SimError::Immovable { link });
-        }
-        Ok(link)
+        link_to_touch(robot, &self.link)
     }
 
     fn check_numbers(&self) -> Result<(), SimError> {
@@ -250,7 +235,28 @@ impl Scenario {
     }
 }
 
-fn within(
+/// Index of a link that can be touched and moves.
+pub(crate) fn link_to_touch(robot: &Robot, name: &str) -> Result<usize, SimError> {
+    let link = robot
+        .link_index(name)
+        .ok_or_else(|| SimError::UnknownLink {
+            link: name.to_owned(),
+            known: names(robot, |_| true),
+        })?;
+    if robot.links[link].mesh.is_none() {
+        return Err(SimError::NoMesh {
+            link: name.to_owned(),
+            known: names(robot, |index| robot.links[index].mesh.is_some()),
+        });
+    }
+    if robot.links[link].path.is_empty() {
+        let link = name.to_owned();
+        return Err(SimError::Immovable { link });
+    }
+    Ok(link)
+}
+
+pub(crate) fn within(
     field: &'static str,
     value: f64,
     low: f64,
