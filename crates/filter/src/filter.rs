@@ -1,6 +1,6 @@
 //! The filter: one `update` a sample.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use palpate_model::{Kinematics, Robot};
 
 use crate::detector::Detector;
@@ -247,12 +247,62 @@ impl Filter {
         &self.cloud
     }
 
+    /// What of each joint's torque, bias removed, the most probable contact's force does not explain, Nm (N for a
+    /// prismatic joint); without contact, all of it.
+    pub fn residual(&self) -> Vec<f64> {
+        let mut residual = self.torque.clone();
+        if let Some(mode) = self.estimate.best() {
+            let path = &self.robot.links[mode.link].path;
+            let jacobian = self.now.jacobian_in_root(mode.link, &mode.point_in_link);
+            for (column, &joint) in jacobian.column_iter().zip(path) {
+                residual[joint] -= column.dot(&mode.force_in_root);
+            }
+        }
+        residual
+    }
+
+    /// Effective sample size of the particles; 0 without contact.
+    pub fn effective_sample_size(&self) -> f64 {
+        let squares: f64 = self.cloud.iter().map(|at| at.weight * at.weight).sum();
+        if squares > 0.0 { 1.0 / squares } else { 0.0 }
+    }
+
+    /// Standard deviation of the particles' points about their mean, m, over all links; 0 without contact.
+    pub fn spread(&self) -> f64 {
+        let weighted = || {
+            self.cloud.iter().map(|at| {
+                let root_from_link = self.now.root_from_link(at.link);
+                (at.weight, (root_from_link * at.point_in_link).coords)
+            })
+        };
+        let mean: Vector3<f64> = weighted().map(|(weight, point)| point * weight).sum();
+        let about_mean =
+            |(weight, point): (f64, Vector3<f64>)| weight * (point - mean).norm_squared();
+        weighted().map(about_mean).sum::<f64>().sqrt()
+    }
+
+    /// Takes other parameters over. What is known of the present contact is forgotten; the bias stays.
+    ///
+    /// # Errors
+    /// If a parameter is out of range; then all stays as it was.
+    pub fn set_parameters(&mut self, parameters: &Parameters) -> Result<(), ParameterError> {
+        parameters.check()?;
+        self.parameters = parameters.clone();
+        self.detector = Detector::new(&self.robot, parameters.detector.clone());
+        self.forget_contact();
+        Ok(())
+    }
+
     /// Forgets everything learned, as at the start.
     pub fn reset(&mut self) {
-        self.estimator = Estimator::new(&self.robot, &self.parameters, self.seed);
         self.detector.reset();
         self.clear_tare();
         self.number = 0;
+        self.forget_contact();
+    }
+
+    fn forget_contact(&mut self) {
+        self.estimator = Estimator::new(&self.robot, &self.parameters, self.seed);
         self.cloud.clear();
         self.estimate.status = ContactStatus::NoContact;
         self.estimate.modes.clear();

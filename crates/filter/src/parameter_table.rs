@@ -49,6 +49,8 @@ pub const PARAMETER_TABLE: &[ParameterRow] = &[
     row("input.pairing_tolerance_secs", "s", "0 to 10", Some([0.0, 10.0]), true, "most that stamps of position and torque may differ"),
     row("input.max_wait_secs", "s", "0 to 3600", Some([0.0, 3600.0]), true, "where the filter is too slow, older samples are lost"),
     row("input.time_jump_secs", "s", "≥ 0", Some([0.0, f64::MAX]), true, "a stamp further back than this starts time anew"),
+    row("input.reset_on_time_jump", "", "", None, true, "whether time that starts anew is followed; if not, such stamps are refused"),
+    row("input.tare_secs", "s", "0.1 to 60", Some([0.1, 60.0]), true, "a tare averages the torques over this"),
     row("filter.method", "", "`palpate`, `paper`", None, true, "the method"),
     row("filter.particles", "", "100 to 10⁷", Some([100.0, 1e7]), true, "number of particles of `paper`"),
     row("filter.located_probability", "", "0 to 1", Some([0.0, 1.0]), true, "least probability of a located contact's first mode"),

@@ -6,7 +6,8 @@ use palpate_model::{Geometry, LoadOptions};
 use serde::{Deserialize, Serialize};
 use serde_yaml_ng::{Mapping, Value};
 
-use crate::{ParameterError, Parameters};
+use crate::tare::TARE_SECS;
+use crate::{PARAMETER_TABLE, ParameterError, Parameters};
 
 /// All parameters of the node and of `palpate replay`; the one place of their defaults, with [`Parameters`]. Unknown
 /// keys are refused.
@@ -98,6 +99,10 @@ pub struct InputSettings {
     /// A stamp that lies further back than this, s, means that time has started anew, as when a bag is played again:
     /// everything learned is forgotten. Smaller steps back are refused. Default 1.
     pub time_jump_secs: f64,
+    /// Whether time that starts anew is followed. If not, stamps that lie back are refused however far. Default true.
+    pub reset_on_time_jump: bool,
+    /// A tare averages the torques over this, s. Default 2.
+    pub tare_secs: f64,
 }
 
 impl Default for InputSettings {
@@ -106,6 +111,8 @@ impl Default for InputSettings {
             pairing_tolerance_secs: 0.02,
             max_wait_secs: 0.5,
             time_jump_secs: 1.0,
+            reset_on_time_jump: true,
+            tare_secs: 2.0,
         }
     }
 }
@@ -237,6 +244,36 @@ impl Settings {
         Ok(settings)
     }
 
+    /// These settings with some parameters changed, as a running node is asked for.
+    ///
+    /// # Errors
+    /// If a name is unknown or its parameter read at start only, or a value is wrong or forbidden; it is named.
+    pub fn changed(
+        &self,
+        changes: impl IntoIterator<Item = (String, Value)>,
+    ) -> Result<Self, SettingsError> {
+        let mut flat = self.to_flat();
+        for (name, value) in changes {
+            let Some(entry) = flat.iter_mut().find(|entry| entry.0 == name) else {
+                let reason = "unknown".to_owned();
+                return Err(SettingsError::Value { name, reason });
+            };
+            entry.1 = value;
+        }
+        let changed = Self::from_flat(flat)?;
+        let before_and_after = self.to_flat().into_iter().zip(changed.to_flat());
+        for ((name, before), (_, after)) in before_and_after {
+            let live = PARAMETER_TABLE
+                .iter()
+                .any(|row| row.name == name && row.live);
+            if before != after && !live {
+                let reason = "read at start only: restart the node to change it".to_owned();
+                return Err(SettingsError::Value { name, reason });
+            }
+        }
+        Ok(changed)
+    }
+
     /// Every parameter that a file can set, by its dotted name, with its value.
     pub fn to_flat(&self) -> Vec<(String, Value)> {
         let mut flat = Vec::new();
@@ -265,6 +302,9 @@ impl Settings {
         )?;
         let jump = self.input.time_jump_secs;
         in_range("input.time_jump_secs", "0 or more", jump, jump >= 0.0)?;
+        let tare = self.input.tare_secs;
+        let fits = TARE_SECS.contains(&tare);
+        in_range("input.tare_secs", "0.1 to 60", tare, fits)?;
         let max_edge = self.robot.max_edge;
         in_range(
             "robot.max_edge",
@@ -416,6 +456,32 @@ mod tests {
         assert!(refusal("/**: {seed: 3}").contains("seed"));
         assert!(refusal("/**: [").contains("not YAML"));
         assert!(refusal("/**: {ros__parameters: {viz: 1, viz.rate: 2}}").contains("viz.rate"));
+    }
+
+    #[test]
+    fn a_running_node_takes_live_changes_only() {
+        let settings = Settings::default();
+        let change = |name: &str, value: Value| settings.changed([(name.to_owned(), value)]);
+        assert_eq!(change("viz.rate", 5.into()).unwrap().viz.rate, 5.0);
+        assert_eq!(change("seed", 1.into()).unwrap(), settings);
+        for (name, value, said) in [
+            ("seed", 2.into(), "seed: read at start only"),
+            ("viz.rat", 5.into(), "viz.rat: unknown"),
+            ("qos_overrides.x", 5.into(), "qos_overrides.x: unknown"),
+            ("viz.rate", 0.into(), "viz.rate is 0, expected 0.1"),
+            ("viz.rate", "fast".into(), "viz.rate: invalid type"),
+            ("viz.rate", Value::Null, "viz.rate: invalid type"),
+            ("filter.detector.on_torque", 0.1.into(), "off_torque is 0.2"),
+        ] {
+            let refusal = change(name, value).unwrap_err().to_string();
+            assert!(refusal.contains(said), "{refusal}");
+        }
+        let both = [("on", 0.1), ("off", 0.05)]
+            .map(|(which, value)| (format!("filter.detector.{which}_torque"), value.into()));
+        assert_eq!(
+            settings.changed(both).unwrap().filter.detector.on_torque,
+            0.1
+        );
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::JointBias;
 
 /// Shortest and longest time that a tare may average over, s.
-const SECS: std::ops::RangeInclusive<f64> = 0.1..=60.0;
+pub(crate) const TARE_SECS: std::ops::RangeInclusive<f64> = 0.1..=60.0;
 
 /// Why a tare was refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -67,7 +67,7 @@ impl Tare {
 
     /// Begins to average; a tare that is running begins anew.
     pub(crate) fn start(&mut self, secs: f64) -> Result<(), TareRefusal> {
-        if !SECS.contains(&secs) {
+        if !TARE_SECS.contains(&secs) {
             return Err(TareRefusal::Duration { found: secs });
         }
         self.clear();

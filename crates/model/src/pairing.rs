@@ -40,6 +40,11 @@ impl Pairing {
         }
     }
 
+    /// From now on, pairs stamps that differ by at most `tolerance_ns` nanoseconds.
+    pub fn set_tolerance(&mut self, tolerance_ns: i64) {
+        self.tolerance_ns = tolerance_ns;
+    }
+
     /// Takes joint positions (in the robot's order); then call [`Pairing::next_sample`] until it gives none.
     pub fn push_position(&mut self, stamp_ns: i64, position: Vec<f64>) {
         if self.positions.len() == Self::WAITING {

@@ -100,7 +100,7 @@ pub struct JointInput {
     torque: Source,
     pairing: Pairing,
     latest_ns: Option<i64>,
-    jump_ns: i64,
+    jump_ns: Option<i64>,
     counts: MessageCounts,
 }
 
@@ -113,9 +113,16 @@ impl JointInput {
             torque: Source::new("external_torque"),
             pairing: Pairing::new(nanoseconds(settings.pairing_tolerance_secs)),
             latest_ns: None,
-            jump_ns: nanoseconds(settings.time_jump_secs),
+            jump_ns: jump_ns(settings),
             counts: MessageCounts::default(),
         }
+    }
+
+    /// Takes over the times of `settings`.
+    pub fn set_times(&mut self, settings: &InputSettings) {
+        self.pairing
+            .set_tolerance(nanoseconds(settings.pairing_tolerance_secs));
+        self.jump_ns = jump_ns(settings);
     }
 
     /// Takes positions; then call [`JointInput::next_sample`] until it gives none.
@@ -165,8 +172,8 @@ impl JointInput {
 
     /// Starts anew where time does, as when a bag is played again.
     fn watch_time(&mut self, stamp_ns: i64) {
-        let jumped = (self.latest_ns)
-            .is_some_and(|latest_ns| stamp_ns < latest_ns.saturating_sub(self.jump_ns));
+        let jumped = (self.latest_ns.zip(self.jump_ns))
+            .is_some_and(|(latest_ns, jump_ns)| stamp_ns < latest_ns.saturating_sub(jump_ns));
         if jumped {
             self.counts.time_jumps += 1;
             self.pairing.clear();
@@ -231,6 +238,11 @@ impl Source {
             }
         }
     }
+}
+
+/// How far back a stamp must lie for time to start anew; none where that is not followed.
+fn jump_ns(settings: &InputSettings) -> Option<i64> {
+    (settings.reset_on_time_jump).then(|| nanoseconds(settings.time_jump_secs))
 }
 
 /// Nanoseconds of a setting. Saturates.
@@ -347,6 +359,40 @@ mod tests {
         );
         // None of this keeps the next good pair from coming through.
         assert_eq!(give(&mut input, 7 * MS, &both, &[1.0, 2.0]).len(), 1);
+    }
+
+    #[test]
+    fn times_can_change_while_it_runs() {
+        let mut input = input();
+        let both = names(&["a", "b"]);
+        let mut settings = InputSettings {
+            reset_on_time_jump: false,
+            ..InputSettings::default()
+        };
+        give(&mut input, 100_000 * MS, &both, &[1.0, 2.0]);
+        input.set_times(&settings);
+        let message = JointMessage {
+            stamp_ns: MS,
+            names: &both,
+            values: &[1.0, 2.0],
+        };
+        assert!(input.torque(message).is_err());
+        settings.pairing_tolerance_secs = 0.0;
+        input.set_times(&settings);
+        for (stamp_ns, expected) in [(100_001 * MS, 0), (100_002 * MS, 1)] {
+            let late = JointMessage {
+                stamp_ns,
+                ..message
+            };
+            input.torque(late).unwrap();
+            let position = JointMessage {
+                stamp_ns: 100_002 * MS,
+                ..message
+            };
+            let _ = input.position(position);
+            let samples = std::iter::from_fn(|| input.next_sample()).count();
+            assert_eq!(samples, expected);
+        }
     }
 
     #[test]
