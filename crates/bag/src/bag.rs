@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::definition::{Definition, short_name};
-use crate::standard::standard_definition;
+use crate::standard::standard_definitions;
 use crate::storage::{BagFile, decompress};
 use crate::{BagError, metadata};
 
@@ -22,11 +22,11 @@ pub struct Topic {
 }
 
 impl Topic {
-    /// The definition that the bag carries for this topic's messages, else the standard one of its type.
+    /// The definition that the bag carries for this topic's messages, else the known ones of its type, one a version.
     ///
     /// # Errors
-    /// If there is neither, or it cannot be understood, or messages are not in CDR.
-    pub fn definition(&self) -> Result<Definition, BagError> {
+    /// If there is none, or it cannot be understood, or messages are not in CDR.
+    pub fn definitions(&self) -> Result<Vec<Definition>, BagError> {
         let wrong = |reason: String| BagError::Definition {
             type_name: self.type_name.clone(),
             reason,
@@ -37,16 +37,25 @@ impl Topic {
                 "expected messages in cdr, found \"{found}\""
             )));
         }
+        let parse = |text: &str| Definition::parse(&self.type_name, text);
         if self.encoding == "ros2msg" && !self.definition.is_empty() {
-            return Definition::parse(&self.type_name, &self.definition);
+            return Ok(vec![parse(&self.definition)?]);
         }
-        match standard_definition(&short_name(&self.type_name)) {
-            Some(text) => Definition::parse(&self.type_name, text),
-            None => Err(wrong(format!(
-                "expected one in ros2msg in the bag, or a standard type; found encoding \"{}\"",
-                self.encoding
-            ))),
+        let short_name = short_name(&self.type_name);
+        let known: Vec<_> = standard_definitions(&short_name)
+            .map(parse)
+            .collect::<Result<_, _>>()?;
+        if known.is_empty() {
+            let found = match self.encoding.as_str() {
+                "" => "none (bags before ROS 2 Iron carry none)".to_owned(),
+                encoding => format!("encoding \"{encoding}\""),
+            };
+            return Err(wrong(format!(
+                "expected one in ros2msg in the bag, or a type that is known without; found {found}; \
+                 `ros2 bag convert` on a machine with this message type writes it into a new bag"
+            )));
         }
+        Ok(known)
     }
 }
 

@@ -26,6 +26,16 @@ pub enum CdrError {
         /// Number of bytes left.
         found: usize,
     },
+    /// Of several definitions of the type, none is as long as the message.
+    #[error(
+        "expected a message as long as one of the {definitions} versions of its type that are known, found {found} bytes"
+    )]
+    NoVersion {
+        /// Number of definitions.
+        definitions: usize,
+        /// Length of the message without its encapsulation, bytes.
+        found: usize,
+    },
     /// Types are nested without end.
     #[error("types are nested more than {limit} deep")]
     TooDeep {
@@ -42,6 +52,34 @@ const DEPTH: usize = 32;
 /// # Errors
 /// Says where the bytes are not what the definition tells. Bytes left over are not an error: writers pad.
 pub fn decode<'d>(definition: &'d Definition, data: &[u8]) -> Result<Value<'d>, CdrError> {
+    decode_counting(definition, data).map(|(value, _)| value)
+}
+
+/// Decodes a message by the one of several definitions that is as long as it. A single one need not be.
+pub(crate) fn decode_any<'d>(
+    definitions: &'d [Definition],
+    data: &[u8],
+) -> Result<Value<'d>, CdrError> {
+    if let [definition] = definitions {
+        return decode(definition, data);
+    }
+    let mut decoded = definitions
+        .iter()
+        .filter_map(|definition| decode_counting(definition, data).ok());
+    let whole = decoded.find(|(_, left)| *left == 0);
+    whole
+        .map(|(value, _)| value)
+        .ok_or_else(|| CdrError::NoVersion {
+            definitions: definitions.len(),
+            found: data.len().saturating_sub(4),
+        })
+}
+
+/// The decoded message, and the number of bytes left over.
+fn decode_counting<'d>(
+    definition: &'d Definition,
+    data: &[u8],
+) -> Result<(Value<'d>, usize), CdrError> {
     let (little_endian, body) = match data {
         [0, 0, _, _, body @ ..] => (false, body),
         [0, 1, _, _, body @ ..] => (true, body),
@@ -56,7 +94,8 @@ pub fn decode<'d>(definition: &'d Definition, data: &[u8]) -> Result<Value<'d>, 
         at: 0,
         little_endian,
     };
-    decoder.message(0, 0)
+    let value = decoder.message(0, 0)?;
+    Ok((value, body.len() - decoder.at))
 }
 
 struct Decoder<'d, 'b> {
@@ -271,7 +310,7 @@ mod tests {
                     found,
                     ..
                 } => assert!(expected > found && at + found == length - 4),
-                CdrError::TooDeep { .. } => panic!("{length}"),
+                other => panic!("{length}: {other}"),
             }
         }
     }

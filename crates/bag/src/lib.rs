@@ -12,7 +12,6 @@ mod metadata;
 mod reading;
 mod record;
 mod samples;
-mod source;
 mod sqlite_file;
 mod standard;
 mod storage;

@@ -1,11 +1,13 @@
 //! From a bag's messages to the robot's samples.
 
-use palpate_model::{JointSample, Pairing, PairingLosses, Robot};
+use palpate_model::{
+    JointPicker, JointReading, JointSample, ModelError, Pairing, PairingLosses, Robot,
+};
 
 use crate::BagError;
 use crate::bag::{Bag, Message};
-use crate::choice::{TopicChoice, choose};
-use crate::reading::{Decoder, NameCache, Quantity, Refusal, pick};
+use crate::choice::{Chosen, TopicChoice, choose};
+use crate::reading::{Decoder, Quantity, Refusal, pick};
 
 /// Messages that gave nothing, by cause.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -31,8 +33,8 @@ impl Unusable {
     fn count(&mut self, refusal: &Refusal) {
         match refusal {
             Refusal::Undecodable(_) => self.undecodable += 1,
-            Refusal::Names(_) => self.names_missing += 1,
-            Refusal::Length(..) => self.wrong_length += 1,
+            Refusal::Joints(_, ModelError::JointsMissing { .. }) => self.names_missing += 1,
+            Refusal::Joints(..) => self.wrong_length += 1,
             Refusal::NotFinite(..) => self.not_finite += 1,
         }
         self.first_reason.get_or_insert_with(|| refusal.to_string());
@@ -65,10 +67,11 @@ pub struct Recording {
     pub losses: PairingLosses,
 }
 
-/// Reads joint positions and external torques of `robot`, pairing stamps that differ by at most `tolerance_ns`.
+/// Reads joint positions and external torques of `robot`, pairing stamps that differ by at most `tolerance_ns`; where
+/// one topic's messages hold both, those of one message belong together.
 ///
 /// Stamps come from the messages' headers; where there is none, or it is zero, from the time of recording. Efforts of
-/// a topic that also has positions hold gravity with most drivers: they are taken as external torques only if
+/// a `JointState` that also has positions hold gravity with most drivers: they are taken as external torques only if
 /// `choice` names that very topic.
 ///
 /// # Errors
@@ -79,17 +82,64 @@ pub fn read_samples(
     choice: &TopicChoice,
     tolerance_ns: i64,
 ) -> Result<Recording, BagError> {
-    let (positions, torques) = choose(bag, robot, choice)?;
-    let mut positions = Reader::new(bag, robot, positions, Quantity::Position)?;
-    let mut torques = Reader::new(bag, robot, torques, Quantity::Effort)?;
-    let mut pairing = Pairing::new(tolerance_ns.max(0));
+    let chosen = choose(bag, robot, choice)?;
+    let names = &choice.joint_names;
+    let recording = if chosen.positions == chosen.torques {
+        read_together(bag, robot, names, chosen.torques)?
+    } else {
+        read_apart(bag, robot, names, chosen, tolerance_ns.max(0))?
+    };
+    if recording.samples.is_empty() {
+        return Err(nothing_read(&recording));
+    }
+    Ok(recording)
+}
+
+/// Reads one topic whose messages hold both.
+fn read_together(
+    bag: &Bag,
+    robot: &Robot,
+    joint_names: &[String],
+    topic: usize,
+) -> Result<Recording, BagError> {
+    let mut reader = Reader::new(bag, robot, joint_names, topic)?;
+    let both = [Quantity::Position, Quantity::Effort];
+    let messages = bag.messages(&[topic])?;
+    let samples = messages
+        .iter()
+        .filter_map(|message| reader.read(message, both))
+        .map(|(stamp_ns, [position, external_torque])| JointSample {
+            stamp_ns,
+            position,
+            external_torque,
+        })
+        .collect();
+    Ok(Recording {
+        samples,
+        positions: reader.report.clone(),
+        torques: reader.report,
+        losses: PairingLosses::default(),
+    })
+}
+
+/// Reads two topics and pairs their messages.
+fn read_apart(
+    bag: &Bag,
+    robot: &Robot,
+    joint_names: &[String],
+    chosen: Chosen,
+    tolerance_ns: i64,
+) -> Result<Recording, BagError> {
+    let mut positions = Reader::new(bag, robot, joint_names, chosen.positions)?;
+    let mut torques = Reader::new(bag, robot, joint_names, chosen.torques)?;
+    let mut pairing = Pairing::new(tolerance_ns);
     let mut samples = Vec::new();
     let mut last_torque_ns = None;
-    for message in bag.messages(&[positions.topic, torques.topic])? {
-        if let Some((stamp_ns, position)) = positions.read(&message) {
+    for message in bag.messages(&[chosen.positions, chosen.torques])? {
+        if let Some((stamp_ns, [position])) = positions.read(&message, [Quantity::Position]) {
             pairing.push_position(stamp_ns, position);
         }
-        if let Some((stamp_ns, torque)) = torques.read(&message) {
+        if let Some((stamp_ns, [torque])) = torques.read(&message, [Quantity::Effort]) {
             last_torque_ns = last_torque_ns.max(Some(stamp_ns));
             pairing.push_torque(stamp_ns, torque);
         }
@@ -97,22 +147,16 @@ pub fn read_samples(
     }
     if let Some(last_ns) = last_torque_ns {
         // A position too late for any torque settles those that still wait for a later one.
-        let late_ns = last_ns
-            .saturating_add(tolerance_ns.max(0))
-            .saturating_add(1);
+        let late_ns = last_ns.saturating_add(tolerance_ns).saturating_add(1);
         pairing.push_position(late_ns, Vec::new());
         samples.extend(std::iter::from_fn(|| pairing.next_sample()));
     }
-    let recording = Recording {
+    Ok(Recording {
         samples,
         positions: positions.report,
         torques: torques.report,
         losses: pairing.losses(),
-    };
-    if recording.samples.is_empty() {
-        return Err(nothing_read(&recording));
-    }
-    Ok(recording)
+    })
 }
 
 fn nothing_read(recording: &Recording) -> BagError {
@@ -136,13 +180,12 @@ fn nothing_read(recording: &Recording) -> BagError {
     }
 }
 
-/// Reads one quantity from one topic.
+/// Reads one topic.
 struct Reader<'a> {
     robot: &'a Robot,
     topic: usize,
-    quantity: Quantity,
     decoder: Decoder,
-    names: NameCache,
+    picker: JointPicker,
     report: TopicReport,
 }
 
@@ -150,15 +193,14 @@ impl<'a> Reader<'a> {
     fn new(
         bag: &Bag,
         robot: &'a Robot,
+        joint_names: &[String],
         topic: usize,
-        quantity: Quantity,
     ) -> Result<Self, BagError> {
         Ok(Self {
             robot,
             topic,
-            quantity,
             decoder: Decoder::new(bag, topic)?,
-            names: NameCache::default(),
+            picker: JointPicker::new(robot, joint_names),
             report: TopicReport {
                 topic: bag.topics()[topic].name.clone(),
                 type_name: bag.topics()[topic].type_name.clone(),
@@ -167,19 +209,35 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Stamp (ns) and values in the robot's order; none if the message is another topic's, or unusable.
-    fn read(&mut self, message: &Message) -> Option<(i64, Vec<f64>)> {
+    /// Stamp (ns) and the wanted values in the robot's order; none if the message is another topic's, or unusable.
+    fn read<const COUNT: usize>(
+        &mut self,
+        message: &Message,
+        wanted: [Quantity; COUNT],
+    ) -> Option<(i64, [Vec<f64>; COUNT])> {
         if message.topic != self.topic {
             return None;
         }
         self.report.messages += 1;
         let read = self.decoder.decode(&message.data).and_then(|reading| {
-            let values = pick(self.robot, &mut self.names, &reading, self.quantity)?;
-            Ok((reading.stamp_ns.unwrap_or(message.log_time_ns), values))
+            let stamp_ns = reading.stamp_ns.unwrap_or(message.log_time_ns);
+            Ok((stamp_ns, self.pick(&reading, wanted)?))
         });
         read.inspect_err(|refusal| self.report.unusable.count(refusal))
             .ok()
             .map(|(stamp_ns, values)| (stamp_ns.clamp(-STAMP_LIMIT_NS, STAMP_LIMIT_NS), values))
+    }
+
+    fn pick<const COUNT: usize>(
+        &mut self,
+        reading: &JointReading,
+        wanted: [Quantity; COUNT],
+    ) -> Result<[Vec<f64>; COUNT], Refusal> {
+        let mut picked = [const { Vec::new() }; COUNT];
+        for (values, quantity) in picked.iter_mut().zip(wanted) {
+            *values = pick(self.robot, &mut self.picker, reading, quantity)?;
+        }
+        Ok(picked)
     }
 }
 

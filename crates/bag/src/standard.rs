@@ -1,6 +1,24 @@
-//! Definitions of the standard message types that this crate reads or writes (fields of ROS 2 Jazzy).
+//! Definitions of the standard message types that this crate reads or writes (fields of ROS 2 Jazzy), and of drivers'
+//! types whose every version is known, for bags that carry none.
 
-/// Fields of each type, by its short name.
+/// Beginning of `lbr_fri_idl/LBRState`.
+macro_rules! lbr_status {
+    () => {
+        "float64 sample_time\nint8 session_state\nint8 connection_quality\nint8 safety_state\n\
+         int8 operation_mode\nint8 drive_state\nint8 client_command_mode\nint8 overlay_type\n\
+         int8 control_mode\nuint32 time_stamp_sec\nuint32 time_stamp_nano_sec\n"
+    };
+}
+
+/// Its end.
+macro_rules! lbr_torques {
+    () => {
+        "float64[7] measured_torque\nfloat64[7] commanded_torque\nfloat64[7] external_torque\n\
+         float64[7] ipo_joint_position\nfloat64 tracking_performance\n"
+    };
+}
+
+/// Fields of each type, by its short name. A type of which there are versions has an entry each.
 const DEFINITIONS: &[(&str, &str)] = &[
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
     ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec\n"),
@@ -28,6 +46,32 @@ const DEFINITIONS: &[(&str, &str)] = &[
     (
         "sensor_msgs/JointState",
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
+    ),
+    (
+        "control_msgs/DynamicJointState",
+        "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] interface_values\n",
+    ),
+    (
+        "control_msgs/InterfaceValue",
+        "string[] interface_names\nfloat64[] values\n",
+    ),
+    // With FRI 1.
+    (
+        "lbr_fri_idl/LBRState",
+        concat!(
+            lbr_status!(),
+            "float64[7] measured_joint_position\nfloat64[7] commanded_joint_position\n",
+            lbr_torques!()
+        ),
+    ),
+    // With FRI 2.
+    (
+        "lbr_fri_idl/LBRState",
+        concat!(
+            lbr_status!(),
+            "float64[7] measured_joint_position\n",
+            lbr_torques!()
+        ),
     ),
     (
         "sensor_msgs/PointField",
@@ -108,10 +152,13 @@ const DEFINITIONS: &[(&str, &str)] = &[
     ),
 ];
 
-/// The definition of a standard type by its short name, `pkg/Type`, without those of the types nested in it.
+/// The definitions of a type by its short name, `pkg/Type`, one a version, without those of the types nested in it.
+pub(crate) fn standard_definitions(short_name: &str) -> impl Iterator<Item = &'static str> {
+    let of_type = move |(name, _): &&(&str, &str)| *name == short_name;
+    DEFINITIONS.iter().filter(of_type).map(|(_, text)| *text)
+}
+
+/// The first of them.
 pub(crate) fn standard_definition(short_name: &str) -> Option<&'static str> {
-    DEFINITIONS
-        .iter()
-        .find(|(name, _)| *name == short_name)
-        .map(|(_, text)| *text)
+    standard_definitions(short_name).next()
 }

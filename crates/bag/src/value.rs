@@ -1,5 +1,7 @@
 //! A decoded message, as a tree.
 
+use palpate_model::Fields;
+
 /// One value of a decoded message. Field names are borrowed from its definition.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value<'d> {
@@ -73,6 +75,32 @@ impl Value<'_> {
     pub fn texts(&self) -> Option<Vec<&str>> {
         match self {
             Self::List(values) => values.iter().map(Self::as_str).collect(),
+            _ => None,
+        }
+    }
+}
+
+impl Fields for &Value<'_> {
+    fn field(self, name: &str) -> Option<Self> {
+        self.get(name)
+    }
+
+    fn integer(self) -> Option<i64> {
+        self.as_i64()
+    }
+
+    fn numbers(self) -> Option<Vec<f64>> {
+        Value::numbers(self)
+    }
+
+    fn texts(self) -> Option<Vec<String>> {
+        let texts = Value::texts(self)?;
+        Some(texts.into_iter().map(str::to_owned).collect())
+    }
+
+    fn messages(self) -> Option<Vec<Self>> {
+        match self {
+            Value::List(values) => Some(values.iter().collect()),
             _ => None,
         }
     }

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use palpate_bag::{Bag, Recording, TopicChoice, TopicReport, read_samples};
 use palpate_filter::{ContactStatus, Filter, Settings};
-use palpate_model::{JointSample, Robot};
+use palpate_model::{JointSample, Robot, Source};
 
 use crate::estimates_csv::EstimatesCsv;
 use crate::last_second::LastSecond;
@@ -19,8 +19,8 @@ use crate::{Usage, progress, read_text, table};
 /// Estimate the contacts of a recorded bag
 ///
 /// Reads a rosbag2 folder (MCAP or sqlite3), a lone .mcap or a lone .db3, pairs joint positions with external joint
-/// torques, and runs the filter on every pair. The same bag, parameters and seed give the same estimates, whatever the
-/// number of threads.
+/// torques (JointState, Float64MultiArray, LBRState, FrankaRobotState or DynamicJointState), and runs the filter on
+/// every pair. The same bag, parameters and seed give the same estimates, whatever the number of threads.
 #[derive(Args)]
 pub struct Replay {
     /// The bag: a rosbag2 folder, an .mcap or a .db3
@@ -129,6 +129,9 @@ impl Replay {
         let choice = TopicChoice {
             positions: self.positions.clone(),
             torques: self.torques.clone(),
+            // The default says nothing of this bag.
+            source: Some(settings.input.source).filter(|source| *source != Source::default()),
+            joint_names: settings.input.unnamed_joints(),
         };
         let tolerance_ns = (settings.input.pairing_tolerance_secs * 1e9).round() as i64;
         let recording = read_samples(&bag, robot, &choice, tolerance_ns).with_context(whose)?;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use palpate_model::{Geometry, LoadOptions};
+use palpate_model::{Geometry, LoadOptions, Source};
 use serde::{Deserialize, Serialize};
 use serde_yaml_ng::{Mapping, Value};
 
@@ -91,6 +91,12 @@ impl RobotSettings {
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct InputSettings {
+    /// Type of the messages that external torques come in, and positions too where it holds both. Default
+    /// `joint_state`.
+    pub source: Source,
+    /// Joints of messages that do not name them, in the order of the values. Empty names are skipped. Default none: all
+    /// of the robot's joints, in its order.
+    pub joint_names: Vec<String>,
     /// Stamps of a position and a torque that belong together differ by at most this, s. Default 0.02.
     pub pairing_tolerance_secs: f64,
     /// A sample that is older than the newest by more than this, s, is lost where the filter has not come to it, and
@@ -108,12 +114,22 @@ pub struct InputSettings {
 impl Default for InputSettings {
     fn default() -> Self {
         Self {
+            source: Source::default(),
+            joint_names: Vec::new(),
             pairing_tolerance_secs: 0.02,
             max_wait_secs: 0.5,
             time_jump_secs: 1.0,
             reset_on_time_jump: true,
             tare_secs: 2.0,
         }
+    }
+}
+
+impl InputSettings {
+    /// The names that are given for messages without; none: the robot's.
+    pub fn unnamed_joints(&self) -> Vec<String> {
+        let given = self.joint_names.iter().filter(|name| !name.is_empty());
+        given.cloned().collect()
     }
 }
 
@@ -491,6 +507,8 @@ mod tests {
         // ROS 2 has no empty list without a type.
         assert_eq!(shipped.robot.package_folders(), [] as [PathBuf; 0]);
         shipped.robot.package_dirs.clear();
+        assert_eq!(shipped.input.unnamed_joints(), [] as [String; 0]);
+        shipped.input.joint_names.clear();
         assert_eq!(shipped, Settings::default());
     }
 

@@ -27,6 +27,14 @@ pub enum ModelError {
         /// Number of values found.
         found: usize,
     },
+    /// A message has not one value a joint name.
+    #[error("expected {expected} values, one a name, found {found}")]
+    ValueCount {
+        /// Number of names.
+        expected: usize,
+        /// Number of values found.
+        found: usize,
+    },
     /// The URDF is not one: not well-formed, or not what the format asks for.
     #[error("malformed URDF: {reason}")]
     Urdf {

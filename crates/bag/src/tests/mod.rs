@@ -3,6 +3,7 @@
 mod choice;
 mod damage;
 mod round_trip;
+mod sources;
 mod storage;
 
 use std::path::{Path, PathBuf};
@@ -75,6 +76,7 @@ fn read_chosen(
     let choice = TopicChoice {
         positions: positions.map(str::to_owned),
         torques: torques.map(str::to_owned),
+        ..TopicChoice::default()
     };
     read_samples(&Bag::open(path)?, &arm(), &choice, TOLERANCE_NS)
 }

@@ -89,10 +89,10 @@ fn write_everything(path: &Path, stamp_ns: i64) {
 /// Decodes the only message of `topic` by the definition that the bag carries, and hands it to `look`.
 fn with_message(bag: &Bag, topic: &str, look: impl FnOnce(&Value<'_>)) {
     let index = bag.topic(topic).unwrap();
-    let definition = bag.topics()[index].definition().unwrap();
+    let definitions = bag.topics()[index].definitions().unwrap();
     let messages = bag.messages(&[index]).unwrap();
     assert_eq!(messages.len(), 1, "{topic}");
-    look(&decode(&definition, &messages[0].data).unwrap());
+    look(&decode(&definitions[0], &messages[0].data).unwrap());
 }
 
 fn number(message: &Value<'_>, path: &str) -> f64 {
