@@ -100,7 +100,9 @@ class Arm:
         self.peer = peer
         self.positions = peer.node.create_publisher(JointState, "joint_states", qos)
         self.torques = peer.node.create_publisher(JointState, "external_torque", qos)
-        self.stamp_ns = 1_000_000_000_000
+        # What the driver's clock is ahead by, and its last stamp.
+        self.offset_ns = 0
+        self.stamp_ns = 0
 
     def is_heard(self):
         return bool(self.positions.get_subscription_count() and self.torques.get_subscription_count())
@@ -109,10 +111,9 @@ class Arm:
         self.peer.wait_until(self.is_heard, "the node to subscribe")
 
     def send(self, positions=None, torques=None, names=JOINTS, stamp_ns=None):
-        """Sends one message on each topic, 10 ms after the last pair."""
+        """Sends one message on each topic, stamped now unless told otherwise."""
         if stamp_ns is None:
-            self.stamp_ns += 10_000_000
-            stamp_ns = self.stamp_ns
+            self.stamp_ns = stamp_ns = time.time_ns() + self.offset_ns
         zeros = [0.0] * len(names)
         state = joint_state(stamp_ns, names)
         state.position = zeros if positions is None else positions

@@ -217,6 +217,11 @@ impl Filter {
         self.bias.fill(JointBias::default());
     }
 
+    /// Ends a tare that is running; the bias is as it was before.
+    pub fn stop_tare(&mut self) {
+        self.tare.interrupt();
+    }
+
     /// How far the last commanded tare is.
     pub fn tare_state(&self) -> TareState {
         self.tare.state()
@@ -287,6 +292,9 @@ impl Filter {
     /// If a parameter is out of range; then all stays as it was.
     pub fn set_parameters(&mut self, parameters: &Parameters) -> Result<(), ParameterError> {
         parameters.check()?;
+        if self.parameters == *parameters {
+            return Ok(());
+        }
         self.parameters = parameters.clone();
         self.detector = Detector::new(&self.robot, parameters.detector.clone());
         self.forget_contact();
@@ -295,13 +303,14 @@ impl Filter {
 
     /// Forgets everything learned, as at the start.
     pub fn reset(&mut self) {
-        self.detector.reset();
+        self.forget_contact();
         self.clear_tare();
         self.number = 0;
-        self.forget_contact();
     }
 
-    fn forget_contact(&mut self) {
+    /// Forgets the present contact; the bias stays.
+    pub fn forget_contact(&mut self) {
+        self.detector.reset();
         self.estimator = Estimator::new(&self.robot, &self.parameters, self.seed);
         self.cloud.clear();
         self.estimate.status = ContactStatus::NoContact;

@@ -1,18 +1,15 @@
 //! The robot's description: from a parameter, a file or a topic.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use futures::{FutureExt, StreamExt};
+use futures::{FutureExt, Stream, StreamExt};
 use palpate_filter::Settings;
 use palpate_model::{IIWA14_MESHES, MeshFiles, MeshSource, ModelError, Robot};
 use palpate_node::Throttle;
 use r2r::QosProfile;
 use r2r::std_msgs::msg::String as Text;
-
-use crate::stopped;
 
 /// The robot of the parameter `robot_description`, else of `robot.description_file`; none where neither is given.
 pub fn from_settings(settings: &Settings) -> anyhow::Result<Option<Robot>> {
@@ -33,32 +30,73 @@ pub fn from_settings(settings: &Settings) -> anyhow::Result<Option<Robot>> {
         .with_context(|| format!("parameter robot.description_file: {}", path.display()))
 }
 
-/// Waits for the topic `robot_description`. A description that is wrong is logged, and the next one waited for. None
-/// when asked to stop.
-pub fn from_topic(
-    node: &mut r2r::Node,
-    settings: &Settings,
-    stop: &AtomicBool,
-) -> anyhow::Result<Option<Robot>> {
-    let latched = QosProfile::default().transient_local().keep_last(1);
-    let mut descriptions = node.subscribe::<Text>("robot_description", latched)?;
-    let mut waiting = Throttle::new(Duration::from_secs(10));
-    while !stopped(stop) {
-        node.spin_once(Duration::from_millis(50));
-        while let Some(Some(description)) = descriptions.next().now_or_never() {
-            match load(&description.data, Path::new(""), settings) {
-                Ok(robot) => return Ok(Some(robot)),
-                Err(error) => tracing::error!("topic robot_description: {error:#}"),
+/// Descriptions that come on the topic `robot_description`, now and later.
+pub struct Descriptions {
+    messages: Box<dyn Stream<Item = Text> + Unpin>,
+    /// The description that is in use.
+    current: Option<String>,
+    refusal: Option<String>,
+    waiting: Throttle,
+    refusals: Throttle,
+}
+
+impl Descriptions {
+    pub fn new(node: &mut r2r::Node) -> r2r::Result<Self> {
+        let latched = QosProfile::default().transient_local().keep_last(1);
+        Ok(Self {
+            messages: Box::new(node.subscribe("robot_description", latched)?),
+            current: None,
+            refusal: None,
+            waiting: Throttle::new(Duration::from_secs(10)),
+            refusals: Throttle::new(Duration::from_secs(10)),
+        })
+    }
+
+    /// What `begin` makes of the robot that came, if one came that is another than before. One that is wrong is logged,
+    /// and all stays as it was.
+    pub fn next<T>(
+        &mut self,
+        settings: &Settings,
+        mut begin: impl FnMut(Robot) -> anyhow::Result<T>,
+    ) -> Option<T> {
+        let mut begun = None;
+        while let Some(Some(Text { data })) = self.messages.next().now_or_never() {
+            if self.current.as_ref() == Some(&data) {
+                continue;
+            }
+            match load(&data, Path::new(""), settings).and_then(&mut begin) {
+                Ok(done) => {
+                    begun = Some(done);
+                    self.current = Some(data);
+                    self.refusal = None;
+                }
+                Err(error) => self.refuse(&error),
             }
         }
-        if waiting.pass(Instant::now()).is_some() {
+        if self.current.is_none() && self.waiting.pass(Instant::now()).is_some() {
             tracing::warn!(
                 "waiting for the topic robot_description, as neither of the parameters robot_description and \
                  robot.description_file is given"
             );
         }
+        begun
     }
-    Ok(None)
+
+    fn refuse(&mut self, error: &anyhow::Error) {
+        let kept = match self.current {
+            Some(_) => "; the robot stays as it was",
+            None => "",
+        };
+        if let Some(more) = self.refusals.pass(Instant::now()) {
+            tracing::error!("topic robot_description (and {more} before): {error:#}{kept}");
+        }
+        self.refusal = Some(format!("{error:#}"));
+    }
+
+    /// Why the last description was refused, if it was.
+    pub fn refusal(&self) -> Option<&str> {
+        self.refusal.as_deref()
+    }
 }
 
 fn load(urdf: &str, folder: &Path, settings: &Settings) -> anyhow::Result<Robot> {

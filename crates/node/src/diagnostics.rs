@@ -1,174 +1,205 @@
 //! What the node tells about itself on `/diagnostics`, once a second.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use palpate_filter::Settings;
 use palpate_model::Robot;
-use palpate_node::{JointInput, MessageCounts, Newest, TimedSample};
+use palpate_node::{Health, JointInput, Level, Losses, Rates, judge};
+use r2r::builtin_interfaces::msg::Time;
 use r2r::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use r2r::{Publisher, QosProfile};
 
-use crate::clock::Clock;
 use crate::estimation::Progress;
+use crate::messages;
 
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// Tells how many messages came, what became of them, and how long the steps took.
+/// What there is to tell of, once the robot is known.
+pub struct Observed<'a> {
+    pub robot: &'a Robot,
+    pub input: &'a JointInput,
+    /// Samples that were lost because the filter is too slow.
+    pub lost: u64,
+    pub progress: &'a Mutex<Progress>,
+}
+
+/// Tells how many messages came, what became of them, how long the steps took and what the filter knows.
 pub struct Diagnostics {
     publisher: Publisher<DiagnosticArray>,
     name: String,
-    robot: String,
-    particles: usize,
-    seed: u64,
-    progress: Arc<Mutex<Progress>>,
-    clock: Clock,
-    next: Instant,
-    before: Before,
-}
-
-/// The counts of the last time, to see what happened since.
-#[derive(Clone, Copy, Default, PartialEq)]
-struct Before {
-    messages: MessageCounts,
-    admitted: u64,
-    refused: u64,
-    lost: u64,
+    last: Instant,
+    before: Losses,
 }
 
 impl Diagnostics {
-    pub fn new(
-        node: &mut r2r::Node,
-        robot: &Robot,
-        settings: &Settings,
-        progress: Arc<Mutex<Progress>>,
-    ) -> r2r::Result<Self> {
+    pub fn new(node: &mut r2r::Node) -> r2r::Result<Self> {
+        let name = node.fully_qualified_name()?;
         Ok(Self {
             publisher: node.create_publisher("/diagnostics", QosProfile::default())?,
-            name: format!(
-                "{}: contact",
-                node.fully_qualified_name()?.trim_start_matches('/')
-            ),
-            robot: robot.name.clone(),
-            particles: settings.filter.particle_count(),
-            seed: settings.seed,
-            progress,
-            clock: Clock::new(node, settings)?,
-            next: Instant::now() + PERIOD,
-            before: Before::default(),
+            name: format!("{}: contact", name.trim_start_matches('/')),
+            last: Instant::now(),
+            before: Losses::default(),
         })
     }
 
-    /// Publishes if a second has passed.
-    pub fn tell(&mut self, input: &JointInput, samples: &Newest<TimedSample>) -> r2r::Result<()> {
-        let stamp = self.clock.now();
-        let now = Instant::now();
-        if now < self.next {
+    /// Publishes if a second has passed. `now` is the node's time; `refusal` is why the last description was refused.
+    pub fn tell(
+        &mut self,
+        now: &Time,
+        settings: &Settings,
+        observed: Option<Observed<'_>>,
+        refusal: Option<&str>,
+    ) -> r2r::Result<()> {
+        let elapsed = self.last.elapsed();
+        if elapsed < PERIOD {
             return Ok(());
         }
-        self.next = now + PERIOD;
-        let mut progress = {
-            let mut shared = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
-            let steps = std::mem::take(&mut shared.steps);
-            Progress {
-                steps,
-                ..shared.clone()
-            }
+        self.last = Instant::now();
+        let mut status = match observed {
+            Some(observed) => self.status(now, settings, &observed, elapsed),
+            None => DiagnosticStatus {
+                level: DiagnosticStatus::ERROR as u8,
+                message: "waiting for the robot's description".to_owned(),
+                ..DiagnosticStatus::default()
+            },
         };
-        progress.steps.sort_unstable();
-        let status = self.status(&progress, input, samples.lost());
+        status.name.clone_from(&self.name);
+        if let Some(refusal) = refusal {
+            status.values.push(pair("description refused", refusal));
+        }
         let mut message = DiagnosticArray {
             status: vec![status],
             ..DiagnosticArray::default()
         };
-        message.header.stamp = stamp;
+        message.header.stamp = now.clone();
         self.publisher.publish(&message)
     }
 
-    fn status(&mut self, progress: &Progress, input: &JointInput, lost: u64) -> DiagnosticStatus {
-        let (messages, intake, pairing) = (input.counts(), progress.intake, input.pairing_losses());
-        let refused_messages =
-            messages.joints_missing + messages.wrong_length + messages.stamp_not_after;
-        let now = Before {
-            messages,
-            admitted: intake.admitted,
-            refused: refused_messages + intake.refused(),
-            lost,
+    fn status(
+        &mut self,
+        now: &Time,
+        settings: &Settings,
+        observed: &Observed<'_>,
+        elapsed: Duration,
+    ) -> DiagnosticStatus {
+        let progress = look(observed.progress);
+        let losses = losses(observed, &progress);
+        // Another robot begins at zero.
+        let before = match losses.is_after(&self.before) {
+            true => self.before,
+            false => Losses::default(),
         };
-        let (level, message) = judge(&self.before, &now);
-        self.before = now;
-        let values = [
-            ("status", progress.status.to_owned()),
-            ("last stamp, ns", progress.last_stamp_ns.to_string()),
-            ("position messages", messages.positions.to_string()),
-            ("torque messages", messages.torques.to_string()),
-            ("samples used", intake.admitted.to_string()),
-            ("samples lost, filter too slow", lost.to_string()),
-            (
-                "torques without position",
-                pairing.torque_without_position.to_string(),
-            ),
-            (
-                "positions without torque",
-                pairing.position_without_torque.to_string(),
-            ),
-            (
-                "refused, joint missing",
-                messages.joints_missing.to_string(),
-            ),
-            (
-                "refused, wrong length",
-                (messages.wrong_length + intake.wrong_length).to_string(),
-            ),
-            ("refused, not finite", intake.not_finite.to_string()),
-            ("refused, too large", intake.too_large.to_string()),
-            (
-                "refused, stamp not after",
-                (messages.stamp_not_after + intake.stamp_not_after).to_string(),
-            ),
-            ("time started anew", messages.time_jumps.to_string()),
-            ("step p50, ms", quantile_ms(&progress.steps, 0.50)),
-            ("step p99, ms", quantile_ms(&progress.steps, 0.99)),
-            ("particles", self.particles.to_string()),
-            ("seed", self.seed.to_string()),
-        ];
+        self.before = losses;
+        let now_ns = messages::nanoseconds(now);
+        let age_secs = (progress.last_stamp_ns).map(|last_ns| (now_ns - last_ns) as f64 * 1e-9);
+        let rates = Rates::between(&before, &losses, elapsed);
+        let (level, message) = judge(&Health {
+            before,
+            now: losses,
+            age_secs,
+            is_disabled: progress.is_disabled,
+        });
+        let mut values = counts(observed, &progress, &losses);
+        values.extend([
+            pair("positions, Hz", format!("{:.1}", rates.positions)),
+            pair("torques, Hz", format!("{:.1}", rates.torques)),
+            pair("samples used, Hz", format!("{:.1}", rates.used)),
+            pair("age of the newest sample, s", seconds(age_secs)),
+        ]);
+        values.extend(figures(settings, &progress));
         DiagnosticStatus {
-            level,
-            name: self.name.clone(),
+            level: match level {
+                Level::Ok => DiagnosticStatus::OK as u8,
+                Level::Warn => DiagnosticStatus::WARN as u8,
+                Level::Error => DiagnosticStatus::ERROR as u8,
+            },
             message: message.to_owned(),
-            hardware_id: self.robot.clone(),
-            values: values
-                .map(|(key, value)| KeyValue {
-                    key: key.to_owned(),
-                    value,
-                })
-                .to_vec(),
+            hardware_id: observed.robot.name.clone(),
+            values,
+            ..DiagnosticStatus::default()
         }
     }
 }
 
-/// Level and reason, from what happened in the last second.
-fn judge(before: &Before, now: &Before) -> (u8, &'static str) {
-    const WARN: u8 = DiagnosticStatus::WARN as u8;
-    const ERROR: u8 = DiagnosticStatus::ERROR as u8;
-    if now.messages.positions == before.messages.positions {
-        (ERROR, "no messages on joint_states")
-    } else if now.messages.torques == before.messages.torques {
-        (ERROR, "no messages on external_torque")
-    } else if now.admitted == before.admitted && now.refused > before.refused {
-        (ERROR, "all messages are refused")
-    } else if now.admitted == before.admitted {
-        (ERROR, "no torque finds a position of its time")
-    } else if now.refused > before.refused {
-        (WARN, "some messages are refused")
-    } else if now.lost > before.lost {
-        (
-            WARN,
-            "the filter is slower than the messages: samples are lost",
-        )
-    } else {
-        (DiagnosticStatus::OK as u8, "working")
+/// Takes the steps' times out, sorted.
+fn look(progress: &Mutex<Progress>) -> Progress {
+    let mut shared = progress.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut steps = std::mem::take(&mut shared.steps);
+    steps.sort_unstable();
+    Progress {
+        steps,
+        ..shared.clone()
     }
+}
+
+fn losses(observed: &Observed<'_>, progress: &Progress) -> Losses {
+    let (messages, intake) = (observed.input.counts(), progress.intake);
+    let refused = messages.joints_missing + messages.wrong_length + messages.stamp_not_after;
+    Losses {
+        positions: messages.positions,
+        torques: messages.torques,
+        used: intake.admitted,
+        refused: refused + intake.refused(),
+        unpaired: observed.input.pairing_losses().torque_without_position,
+        lost: observed.lost,
+    }
+}
+
+fn counts(observed: &Observed<'_>, progress: &Progress, losses: &Losses) -> Vec<KeyValue> {
+    let (messages, intake) = (observed.input.counts(), progress.intake);
+    let pairing = observed.input.pairing_losses();
+    let wrong_length = messages.wrong_length + intake.wrong_length;
+    let stamp_not_after = messages.stamp_not_after + intake.stamp_not_after;
+    [
+        ("position messages", messages.positions),
+        ("torque messages", messages.torques),
+        ("samples used", intake.admitted),
+        ("samples lost, filter too slow", losses.lost),
+        ("torques without position", pairing.torque_without_position),
+        ("positions without torque", pairing.position_without_torque),
+        ("refused, joint missing", messages.joints_missing),
+        ("refused, wrong length", wrong_length),
+        ("refused, not finite", intake.not_finite),
+        ("refused, too large", intake.too_large),
+        ("refused, stamp not after", stamp_not_after),
+        ("time started anew", messages.time_jumps),
+    ]
+    .map(|(key, count)| pair(key, count))
+    .to_vec()
+}
+
+fn figures(settings: &Settings, progress: &Progress) -> [KeyValue; 9] {
+    let bias_age = (progress.last_stamp_ns.zip(progress.tared_ns))
+        .map(|(last_ns, tared_ns)| (last_ns - tared_ns) as f64 * 1e-9);
+    [
+        pair("status", progress.status),
+        pair("last stamp, ns", progress.last_stamp_ns.unwrap_or_default()),
+        pair("step p50, ms", quantile_ms(&progress.steps, 0.50)),
+        pair("step p99, ms", quantile_ms(&progress.steps, 0.99)),
+        pair("particles", settings.filter.particle_count()),
+        pair(
+            "effective sample size",
+            format!("{:.1}", progress.effective_sample_size),
+        ),
+        pair(
+            "spread of the particles, m",
+            format!("{:.4}", progress.spread),
+        ),
+        pair("seed", settings.seed),
+        pair("age of the tare, s", seconds(bias_age)),
+    ]
+}
+
+fn pair(key: &str, value: impl ToString) -> KeyValue {
+    KeyValue {
+        key: key.to_owned(),
+        value: value.to_string(),
+    }
+}
+
+fn seconds(secs: Option<f64>) -> String {
+    secs.map_or("none".to_owned(), |secs| format!("{secs:.3}"))
 }
 
 /// Of durations in ascending order.

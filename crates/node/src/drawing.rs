@@ -1,6 +1,6 @@
 //! The thread that draws: estimation hands it the latest state when asked, and never waits for it.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use palpate_filter::{ContactEstimate, Particle, Scene};
@@ -22,15 +22,25 @@ pub struct Drawing {
 /// Where estimation puts a drawing when one is waited for.
 pub struct Easel {
     waiting: AtomicBool,
+    period_ns: AtomicU64,
     drawings: Newest<Drawing>,
 }
 
 impl Easel {
-    pub fn new() -> Self {
-        Self {
+    /// For `rate` drawings a second at most.
+    pub fn new(rate: f64) -> Self {
+        let easel = Self {
             waiting: AtomicBool::new(false),
+            period_ns: AtomicU64::new(0),
             drawings: Newest::new(1),
-        }
+        };
+        easel.set_rate(rate);
+        easel
+    }
+
+    /// From the next drawing on, `rate` a second at most.
+    pub fn set_rate(&self, rate: f64) {
+        self.period_ns.store((1e9 / rate) as u64, Ordering::Relaxed);
     }
 
     /// Whether a drawing is waited for.
@@ -49,6 +59,10 @@ impl Easel {
         self.drawings.close();
     }
 
+    fn period(&self) -> Duration {
+        Duration::from_nanos(self.period_ns.load(Ordering::Relaxed))
+    }
+
     fn ask(&self) -> Option<Drawing> {
         self.waiting.store(true, Ordering::Release);
         self.drawings.pop()
@@ -56,18 +70,19 @@ impl Easel {
 }
 
 /// Where drawings go.
+#[derive(Clone)]
 pub struct Pictures {
     pub cloud: Publisher<PointCloud2>,
     pub markers: Publisher<MarkerArray>,
 }
 
 impl Pictures {
-    /// Draws every `period`, for as long as `easel` is open and whenever somebody looks.
+    /// Draws as often as `easel` says, for as long as it is open and whenever somebody looks.
     ///
     /// # Errors
     /// If ROS 2 refuses to publish.
-    pub fn run(&self, robot: &Robot, easel: &Easel, period: Duration) -> r2r::Result<()> {
-        while easel.drawings.wait_open(period) {
+    pub fn run(&self, robot: &Robot, easel: &Easel) -> r2r::Result<()> {
+        while easel.drawings.wait_open(easel.period()) {
             let cloud_wanted = self.cloud.get_inter_process_subscription_count()? > 0;
             let markers_wanted = self.markers.get_inter_process_subscription_count()? > 0;
             if !(cloud_wanted || markers_wanted) {

@@ -1,32 +1,48 @@
 //! The thread that estimates.
 
+use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use palpate_filter::{ContactEstimate, ContactPose, Filter, Intake, IntakeCounts};
+use palpate_filter::{ContactEstimate, ContactPose, Filter, Intake, IntakeCounts, TareState};
 use palpate_model::{JointSample, Kinematics, Robot};
 use palpate_node::{Newest, Throttle, TimedSample};
 use r2r::Publisher;
 use r2r::geometry_msgs::msg::{PoseWithCovarianceStamped, WrenchStamped};
+use r2r::sensor_msgs::msg::JointState;
 use r2r::std_msgs::msg::Bool;
 
 use crate::drawing::{Drawing, Easel};
 use crate::messages;
+use crate::order::{Asked, Order, Outcome};
+
+/// How long to wait for a sample before looking for orders.
+const PATIENCE: Duration = Duration::from_millis(20);
 
 /// Where the estimate goes.
+#[derive(Clone)]
 pub struct Outputs {
     pub pose: Publisher<PoseWithCovarianceStamped>,
     pub wrench: Publisher<WrenchStamped>,
     /// Latched, and published when it changes.
     pub detected: Publisher<Bool>,
+    pub residual: Publisher<JointState>,
+    pub link_probabilities: Publisher<JointState>,
 }
 
 /// What the estimating thread tells about itself.
 #[derive(Clone, Debug, Default)]
 pub struct Progress {
     pub intake: IntakeCounts,
+    pub is_disabled: bool,
     pub status: &'static str,
-    pub last_stamp_ns: i64,
+    pub last_stamp_ns: Option<i64>,
+    /// Stamp of the sample with which the last tare was done.
+    pub tared_ns: Option<i64>,
+    pub particles: usize,
+    pub effective_sample_size: f64,
+    /// Standard deviation of the particles' points, m.
+    pub spread: f64,
     /// How long the updates took since this was last looked at.
     pub steps: Vec<Duration>,
 }
@@ -40,7 +56,10 @@ pub struct Estimation {
     easel: Arc<Easel>,
     progress: Arc<Mutex<Progress>>,
     epoch: u64,
+    enabled: bool,
     detected: Option<bool>,
+    /// Who waits for the tare that is running, and until when.
+    taring: Option<(Sender<Outcome>, Instant)>,
     complaints: Throttle,
 }
 
@@ -60,7 +79,9 @@ impl Estimation {
             easel,
             progress,
             epoch: 0,
+            enabled: true,
             detected: None,
+            taring: None,
             complaints: Throttle::new(Duration::from_secs(5)),
         }
     }
@@ -69,21 +90,124 @@ impl Estimation {
     ///
     /// # Errors
     /// If ROS 2 refuses to publish.
-    pub fn run(mut self, samples: &Newest<TimedSample>) -> r2r::Result<()> {
+    pub fn run(
+        mut self,
+        samples: &Newest<TimedSample>,
+        orders: &Receiver<Asked>,
+    ) -> r2r::Result<()> {
         self.tell_detected(false)?;
-        while let Some(timed) = samples.pop() {
-            if timed.epoch != self.epoch {
-                tracing::warn!(
-                    "time went back to {} ns: starting anew",
-                    timed.sample.stamp_ns
-                );
-                self.epoch = timed.epoch;
-                self.intake.restart();
-                self.filter.reset();
+        while !samples.is_closed() {
+            for asked in orders.try_iter() {
+                self.obey(asked)?;
             }
-            self.take(&timed.sample)?;
+            if let Some(timed) = samples.pop_within(PATIENCE) {
+                self.follow_time(&timed);
+                if self.enabled {
+                    self.take(&timed.sample)?;
+                }
+            }
+            self.watch_tare();
         }
         Ok(())
+    }
+
+    fn follow_time(&mut self, timed: &TimedSample) {
+        if timed.epoch != self.epoch {
+            let stamp_ns = timed.sample.stamp_ns;
+            tracing::warn!("time went back to {stamp_ns} ns: starting anew");
+            self.epoch = timed.epoch;
+            self.intake.restart();
+            self.filter.reset();
+            self.lock_progress().tared_ns = None;
+        }
+    }
+
+    fn obey(&mut self, Asked { order, reply }: Asked) -> r2r::Result<()> {
+        let outcome = match order {
+            Order::Reset => {
+                self.filter.forget_contact();
+                self.tell_detected(false)?;
+                Outcome::done("the contact is forgotten")
+            }
+            Order::Tare(secs) => match self.start_tare(secs) {
+                Ok(()) => {
+                    // A tare takes the samples' time, which may be slower than this clock.
+                    let until = Instant::now() + Duration::from_secs_f64(5.0 + 2.0 * secs);
+                    self.taring = Some((reply, until));
+                    return Ok(());
+                }
+                Err(refusal) => refusal,
+            },
+            Order::ClearTare => {
+                self.filter.clear_tare();
+                self.lock_progress().tared_ns = None;
+                Outcome::done("the torques count as they are measured")
+            }
+            Order::Enable(enabled) => {
+                self.enable(enabled)?;
+                Outcome::done(if enabled { "enabled" } else { "disabled" })
+            }
+            Order::Parameters(parameters) => match self.filter.set_parameters(&parameters) {
+                Ok(()) => {
+                    self.tell_detected(self.filter.estimate().best().is_some())?;
+                    Outcome::done("parameters changed")
+                }
+                Err(refusal) => Outcome::refused(refusal),
+            },
+        };
+        Asked::tell(&reply, outcome);
+        Ok(())
+    }
+
+    fn enable(&mut self, enabled: bool) -> r2r::Result<()> {
+        self.enabled = enabled;
+        self.lock_progress().is_disabled = !enabled;
+        self.filter.forget_contact();
+        self.tell_detected(false)
+    }
+
+    fn start_tare(&mut self, secs: f64) -> Result<(), Outcome> {
+        if !self.enabled {
+            return Err(Outcome::refused("disabled: enable before the tare"));
+        }
+        self.filter.start_tare(secs).map_err(Outcome::refused)?;
+        if let Some((earlier, _)) = self.taring.take() {
+            Asked::tell(&earlier, Outcome::refused("another tare began"));
+        }
+        Ok(())
+    }
+
+    /// Tells who asked for a tare when it is over.
+    fn watch_tare(&mut self) {
+        let Some((reply, until)) = self.taring.take() else {
+            return;
+        };
+        let outcome = match self.filter.tare_state() {
+            TareState::Running { .. } if Instant::now() < until => {
+                self.taring = Some((reply, until));
+                return;
+            }
+            TareState::Running { .. } => {
+                self.filter.stop_tare();
+                Outcome::refused("too few samples came for a tare")
+            }
+            TareState::Done => {
+                let mut progress = self.lock_progress();
+                progress.tared_ns = progress.last_stamp_ns;
+                Outcome::done(format!("bias: {}", self.bias_in_words()))
+            }
+            TareState::Interrupted => {
+                Outcome::refused("something touched: the bias is as it was before")
+            }
+            TareState::None => Outcome::refused("the tare was cleared"),
+        };
+        Asked::tell(&reply, outcome);
+    }
+
+    fn bias_in_words(&self) -> String {
+        let joints = self.robot.joints.iter().zip(self.filter.bias());
+        let words = joints.map(|(joint, bias)| format!("{} {:.3} Nm", joint.name, bias.mean));
+        words.collect::<Vec<_>>().join(", ")
     }
 
     fn take(&mut self, sample: &JointSample) -> r2r::Result<()> {
@@ -93,6 +217,7 @@ impl Estimation {
                 let estimate = self.filter.update(admitted).clone();
                 self.note(&estimate, begin.elapsed());
                 self.publish(&estimate)?;
+                self.publish_details(&estimate)?;
                 if self.easel.is_waiting() {
                     self.draw(sample, estimate);
                 }
@@ -126,6 +251,34 @@ impl Estimation {
         Ok(())
     }
 
+    /// For those who look.
+    fn publish_details(&self, estimate: &ContactEstimate) -> r2r::Result<()> {
+        let header = || messages::header(estimate.stamp_ns, self.robot.root());
+        let outputs = &self.outputs;
+        if outputs.residual.get_inter_process_subscription_count()? > 0 {
+            outputs.residual.publish(&JointState {
+                header: header(),
+                name: self.robot.joints.iter().map(|at| at.name.clone()).collect(),
+                effort: self.filter.residual(),
+                ..JointState::default()
+            })?;
+        }
+        let probabilities = &outputs.link_probabilities;
+        if probabilities.get_inter_process_subscription_count()? > 0 {
+            let links = self.robot.links.iter().enumerate();
+            let (name, position) = links
+                .map(|(index, link)| (link.name.clone(), estimate.link_probability(index)))
+                .unzip();
+            probabilities.publish(&JointState {
+                header: header(),
+                name,
+                position,
+                ..JointState::default()
+            })?;
+        }
+        Ok(())
+    }
+
     fn tell_detected(&mut self, detected: bool) -> r2r::Result<()> {
         if self.detected == Some(detected) {
             return Ok(());
@@ -148,7 +301,13 @@ impl Estimation {
         let mut progress = self.lock_progress();
         progress.intake = self.intake.counts();
         progress.status = estimate.status.word();
-        progress.last_stamp_ns = estimate.stamp_ns;
+        progress.last_stamp_ns = Some(estimate.stamp_ns);
+        // Figures are for somebody who looks once a second.
+        if progress.steps.is_empty() {
+            progress.particles = self.filter.particles().len();
+            progress.effective_sample_size = self.filter.effective_sample_size();
+            progress.spread = self.filter.spread();
+        }
         progress.steps.push(step);
     }
 

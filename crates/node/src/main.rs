@@ -9,8 +9,11 @@ mod diagnostics;
 mod drawing;
 mod estimation;
 mod messages;
+mod order;
+mod parameter_services;
 mod parameters;
 mod reader;
+mod services;
 mod topics;
 
 use std::io::IsTerminal as _;
@@ -42,17 +45,7 @@ fn main() -> ExitCode {
         Ok(robot) => robot,
         Err(error) => return report(&error, BAD_PARAMETERS),
     };
-    let run = || {
-        let robot = match robot {
-            Some(robot) => Some(robot),
-            None => description::from_topic(&mut node, &settings, &stop)?,
-        };
-        match robot {
-            Some(robot) => topics::run(&mut node, robot, &settings, &stop),
-            None => Ok(()),
-        }
-    };
-    match run() {
+    match topics::run(&mut node, robot, settings, &stop) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.is::<palpate_filter::ParameterError>() => {
             report(&error, BAD_PARAMETERS)
@@ -72,7 +65,6 @@ fn start() -> anyhow::Result<Started> {
     let node =
         r2r::Node::create(create_context()?, "palpate", "").context("cannot create the node")?;
     let settings = parameters::read(&node)?;
-    parameters::declare(&node, &settings);
     Ok((node, settings, stop))
 }
 

@@ -55,15 +55,19 @@ impl<T> Newest<T> {
     /// Takes the oldest entry out, waiting for one. None after [`Newest::close`].
     pub fn pop(&self) -> Option<T> {
         let state = self.lock();
-        let mut state = self
+        let state = self
             .arrived
-            .wait_while(state, |state| state.waiting.is_empty() && !state.closed)
-            .unwrap_or_else(PoisonError::into_inner);
-        if state.closed {
-            None
-        } else {
-            state.waiting.pop_front()
-        }
+            .wait_while(state, |state| state.waiting.is_empty() && !state.closed);
+        take(&mut state.unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// As [`Newest::pop`], but waits for `time` at most.
+    pub fn pop_within(&self, time: Duration) -> Option<T> {
+        let state = self.lock();
+        let waited = self.arrived.wait_timeout_while(state, time, |state| {
+            state.waiting.is_empty() && !state.closed
+        });
+        take(&mut waited.unwrap_or_else(PoisonError::into_inner).0)
     }
 
     /// Takes the oldest entry out, if there is one.
@@ -78,6 +82,11 @@ impl<T> Newest<T> {
             .wait_timeout_while(self.lock(), time, |state| !state.closed)
             .unwrap_or_else(PoisonError::into_inner);
         !state.closed
+    }
+
+    /// Whether it was closed.
+    pub fn is_closed(&self) -> bool {
+        self.lock().closed
     }
 
     /// Ends the reader's waiting, now and later.
@@ -99,6 +108,13 @@ impl<T> Newest<T> {
     fn lock(&self) -> MutexGuard<'_, State<T>> {
         // A panic elsewhere leaves the queue as it was between two calls.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn take<T>(state: &mut State<T>) -> Option<T> {
+    match state.closed {
+        true => None,
+        false => state.waiting.pop_front(),
     }
 }
 
@@ -128,6 +144,7 @@ mod tests {
         }
         assert_eq!(buffer.lost(), 2);
         assert_eq!([buffer.pop(), buffer.pop()], [Some(5), Some(3)]);
+        assert_eq!(buffer.pop_within(Duration::from_millis(1)), None);
     }
 
     #[test]
@@ -139,6 +156,7 @@ mod tests {
             assert_eq!(reader.join().unwrap(), None);
         });
         assert!(!buffer.wait_open(Duration::from_secs(3600)));
+        assert!(buffer.is_closed());
     }
 
     #[test]

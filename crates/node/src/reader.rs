@@ -45,6 +45,12 @@ impl Reader {
         })
     }
 
+    /// Takes over the times of `settings`.
+    pub fn set_times(&mut self, settings: &InputSettings) {
+        self.input.set_times(settings);
+        self.max_wait_ns = nanoseconds(settings.max_wait_secs);
+    }
+
     /// Takes all that has come: r2r itself would drop the newest.
     pub fn drain(&mut self) {
         while let Some(Some(message)) = self.positions.next().now_or_never() {
