@@ -142,9 +142,12 @@ mod tests {
         judge(&health)
     }
 
+    /// What happens, and the level and words that tell of it.
+    type Case = (fn(&mut Health), Level, &'static str);
+
     #[test]
     fn each_trouble_has_its_level_and_reason() {
-        let cases: [(fn(&mut Health), Level, &str); 10] = [
+        let cases: [Case; 10] = [
             (|_| {}, Level::Ok, "working"),
             (|at| at.now.positions = 100, Level::Error, "joint_states"),
             (|at| at.now.torques = 50, Level::Error, "external_torque"),
