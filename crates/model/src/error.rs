@@ -87,6 +87,16 @@ pub enum ModelError {
         /// The number or numbers.
         found: String,
     },
+    /// There is not one value a joint.
+    #[error("{what}: expected {expected} values, one a joint, found {found}")]
+    JointCount {
+        /// What the values say.
+        what: &'static str,
+        /// Number of movable joints.
+        expected: usize,
+        /// Number of values.
+        found: usize,
+    },
     /// A link moves and has no mass.
     #[error(
         "link `{link}`: expected a mass and an inertia in the URDF, as it moves, found none: without them no external \

@@ -9,6 +9,7 @@ mod adjacency;
 mod clean;
 mod dynamics;
 mod error;
+mod external_torque;
 mod iiwa14;
 mod inertial;
 mod joint_map;
@@ -34,6 +35,10 @@ mod urdf;
 pub use clean::Cleaning;
 pub use dynamics::{Dynamics, DynamicsWorkspace, Momentum};
 pub use error::ModelError;
+pub use external_torque::{
+    BeyondLimit, ExternalTorque, ExternalTorqueOptions, JointFriction, TorqueCounts, TorqueMethod,
+    TorqueRefusal, VelocitySource,
+};
 pub use iiwa14::{IIWA14_MESHES, IIWA14_URDF, iiwa14};
 pub use inertial::{Inertial, Payload, inertia_matrix};
 pub use joint_map::JointMap;
