@@ -71,7 +71,6 @@ pub struct Filter {
     parameters: Parameters,
     detector: Detector,
     tare: Tare,
-    bias: Vec<JointBias>,
     /// External torques of the last sample without bias, Nm.
     torque: Vec<f64>,
     estimator: Estimator,
@@ -99,9 +98,8 @@ impl Filter {
         check_paths(robot)?;
         let count = parameters.particles;
         Ok(Self {
-            detector: Detector::new(robot, parameters.detector.clone()),
+            detector: Detector::new(robot, &parameters.detector)?,
             tare: Tare::new(robot.dof()),
-            bias: vec![JointBias::default(); robot.dof()],
             torque: vec![0.0; robot.dof()],
             estimator: Estimator::new(robot, parameters, seed),
             modes: ModeFinder::new(robot, &skin),
@@ -124,14 +122,15 @@ impl Filter {
 
     /// Takes one sample in. Cannot fail, and allocates nothing in steady state.
     pub fn update(&mut self, sample: Admitted<'_>) -> &ContactEstimate {
+        self.detector.update(sample);
         let sample = sample.sample();
         std::mem::swap(&mut self.before, &mut self.now);
         self.now.update(&self.robot, &sample.position);
         let was_in_contact = self.estimate.status != ContactStatus::NoContact;
-        self.take_bias_out(&sample.external_torque);
-        self.detector.update(sample.stamp_ns, &self.torque);
+        let measured = &sample.external_torque;
+        self.carry_tare_on(sample.stamp_ns, measured);
+        self.take_bias_out(measured);
         let in_contact = self.detector.detection().in_contact;
-        self.carry_tare_on(sample.stamp_ns, &sample.external_torque);
         self.cloud.clear();
         self.estimate.modes.clear();
         if in_contact {
@@ -148,7 +147,7 @@ impl Filter {
                 position_before: &self.position_before,
                 position: &sample.position,
                 torque: &self.torque,
-                bias: &self.bias,
+                bias: self.detector.bias(),
                 number: self.number,
             };
             self.estimator.step(&step, sample.stamp_ns);
@@ -182,7 +181,7 @@ impl Filter {
 
     fn take_bias_out(&mut self, external_torque: &[f64]) {
         for ((torque, measured), bias) in
-            (self.torque.iter_mut().zip(external_torque)).zip(&self.bias)
+            (self.torque.iter_mut().zip(external_torque)).zip(self.detector.bias())
         {
             *torque = measured - bias.mean;
         }
@@ -190,31 +189,37 @@ impl Filter {
 
     /// The tare takes torques in as they are measured, with the bias.
     fn carry_tare_on(&mut self, stamp_ns: i64, external_torque: &[f64]) {
-        if self.detector.detection().in_contact {
+        if self.seen_contact().is_some() {
             self.tare.interrupt();
         } else if self.tare.take(stamp_ns, external_torque) {
-            for (joint, bias) in self.bias.iter_mut().enumerate() {
-                *bias = self.tare.bias(joint);
-            }
+            self.detector.set_bias(|joint| self.tare.bias(joint));
         }
+    }
+
+    /// Since when something touches, ns, if it was seen to begin: a torque that was there when the stream began may as
+    /// well be a bias.
+    fn seen_contact(&self) -> Option<i64> {
+        let since_ns = self.detector.detection().since_ns;
+        since_ns.filter(|_| !self.detector.has_unseen_begin())
     }
 
     /// Begins to tare: the mean of each joint's torque over the next `secs` (0.1 to 60 s) becomes its bias. The robot
-    /// should rest, and nothing touch it; see [`Filter::tare_state`] for how it goes.
+    /// should rest, and nothing touch it; see [`Filter::tare_state`] for how it goes. What seemed to touch since the
+    /// stream began or since the last [`Filter::reset`] is tared as well.
     ///
     /// # Errors
-    /// If something touches, or the time is out of range.
+    /// If something was seen to touch, or the time is out of range.
     pub fn start_tare(&mut self, secs: f64) -> Result<(), TareRefusal> {
-        if let Some(since_ns) = self.detector.detection().since_ns {
-            return Err(TareRefusal::InContact { since_ns });
+        match self.seen_contact() {
+            Some(since_ns) => Err(TareRefusal::InContact { since_ns }),
+            None => self.tare.start(secs),
         }
-        self.tare.start(secs)
     }
 
-    /// Forgets the bias, tared or learned: the torques count as they are measured.
+    /// Forgets the bias, tared or learned, and the noise: the torques count as they are measured.
     pub fn clear_tare(&mut self) {
         self.tare.clear();
-        self.bias.fill(JointBias::default());
+        self.detector.reset();
     }
 
     /// Ends a tare that is running; the bias is as it was before.
@@ -229,7 +234,7 @@ impl Filter {
 
     /// The bias of each joint's external torque, tared or learned.
     pub fn bias(&self) -> &[JointBias] {
-        &self.bias
+        self.detector.bias()
     }
 
     /// Whether anything touched at the last update, and what the torques tell of it without the estimate.
@@ -286,7 +291,7 @@ impl Filter {
         weighted().map(about_mean).sum::<f64>().sqrt()
     }
 
-    /// Takes other parameters over. What is known of the present contact is forgotten; the bias stays.
+    /// Takes other parameters over. What is known of the present contact is forgotten; bias and noise stay.
     ///
     /// # Errors
     /// If a parameter is out of range; then all stays as it was.
@@ -296,7 +301,7 @@ impl Filter {
             return Ok(());
         }
         self.parameters = parameters.clone();
-        self.detector = Detector::new(&self.robot, parameters.detector.clone());
+        self.detector.set_parameters(&parameters.detector)?;
         self.forget_contact();
         Ok(())
     }
@@ -308,9 +313,9 @@ impl Filter {
         self.number = 0;
     }
 
-    /// Forgets the present contact; the bias stays.
+    /// Forgets the present contact; bias and noise stay. What touches on begins anew, and may now be tared.
     pub fn forget_contact(&mut self) {
-        self.detector.reset();
+        self.detector.forget_contact();
         self.estimator = Estimator::new(&self.robot, &self.parameters, self.seed);
         self.cloud.clear();
         self.estimate.status = ContactStatus::NoContact;

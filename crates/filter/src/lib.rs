@@ -1,6 +1,5 @@
 //! Where the contact is: a particle filter over the triangles of each link's mesh.
 
-mod bias;
 mod detection;
 mod detector;
 mod estimate;
@@ -21,9 +20,8 @@ mod skin;
 mod step;
 mod tare;
 
-pub use bias::JointBias;
 pub use detection::{ContactChange, ContactEvent, Detection};
-pub use detector::DetectorParameters;
+pub use detector::{Detector, DetectorParameters, JointBias};
 pub use estimate::{ContactEstimate, ContactStatus, Mode};
 pub use filter::Filter;
 pub use intake::{Admitted, Intake, IntakeCounts, Refusal};

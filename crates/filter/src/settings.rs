@@ -487,17 +487,19 @@ mod tests {
             ("viz.rate", 0.into(), "viz.rate is 0, expected 0.1"),
             ("viz.rate", "fast".into(), "viz.rate: invalid type"),
             ("viz.rate", Value::Null, "viz.rate: invalid type"),
-            ("filter.detector.on_torque", 0.1.into(), "off_torque is 0.2"),
+            (
+                "filter.detector.release_share",
+                2.into(),
+                "release_share is 2",
+            ),
         ] {
             let refusal = change(name, value).unwrap_err().to_string();
             assert!(refusal.contains(said), "{refusal}");
         }
-        let both = [("on", 0.1), ("off", 0.05)]
-            .map(|(which, value)| (format!("filter.detector.{which}_torque"), value.into()));
-        assert_eq!(
-            settings.changed(both).unwrap().filter.detector.on_torque,
-            0.1
-        );
+        let both = [("paper.force_max", 5.0), ("paper.rate_hz", 7.0)]
+            .map(|(which, value)| (format!("filter.{which}"), value.into()));
+        let paper = settings.changed(both).unwrap().filter.paper;
+        assert_eq!((paper.force_max, paper.rate_hz), (5.0, 7.0));
     }
 
     #[test]

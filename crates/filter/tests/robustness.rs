@@ -6,8 +6,8 @@ mod robots;
 
 use nalgebra::Point3;
 use palpate_filter::{
-    ContactEstimate, ContactStatus, Filter, Intake, Method, Mode, PalpateParameters,
-    ParameterError, Parameters, Particle,
+    ContactEstimate, ContactStatus, DetectorParameters, Filter, Intake, Method, Mode,
+    PalpateParameters, ParameterError, Parameters, Particle,
 };
 use palpate_model::{JointSample, Robot, TriangleMesh};
 use rand::rngs::Xoshiro256PlusPlus;
@@ -188,10 +188,19 @@ fn assert_sane_particles(robot: &Robot, particles: &[Particle], what: &str) {
     );
 }
 
-/// The fewest particles that are allowed.
+/// The fewest particles that are allowed, and a detector that takes most garbage for a contact.
 fn fewest(method: Method) -> Parameters {
     Parameters {
         method,
+        detector: DetectorParameters {
+            false_alarms_per_hour: 1000.0,
+            least_torque: 0.001,
+            min_secs: 0.0,
+            release_share: 0.1,
+            release_secs: 60.0,
+            motion_std: 0.0,
+            ..DetectorParameters::default()
+        },
         particles: 100,
         palpate: PalpateParameters {
             hypotheses: 50,

@@ -1,0 +1,346 @@
+//! Is anything touching? A bank of control charts a joint, on what the torque is off its learned bias.
+//!
+//! Each joint's residual is smoothed exponentially with several time constants (Roberts 1959), short ones for hard pushes
+//! and long ones for soft ones. A smoothed residual that exceeds so many of its standard deviations that noise does it at
+//! most at the stated rate ([`alarm`]) is a contact. The standard deviation is learned while nothing touches ([`noise`]):
+//! white noise from second differences, what does not average out from the smoothed residuals themselves, so that noise
+//! may be correlated or quantised, and what grows with motion. The bias is a slow random walk ([`bias`]), faster in motion.
+//! All learning from the time shortly before a contact is taken back.
+
+mod alarm;
+mod bias;
+mod blocks;
+mod joint;
+mod motion;
+mod noise;
+mod parameters;
+
+use palpate_model::{JointSample, Link, Robot};
+
+use crate::{Admitted, ContactChange, ContactEvent, Detection, ParameterError};
+
+use bias::Forgetting;
+pub use bias::JointBias;
+use blocks::Blocks;
+use joint::{Charts, JointDetector, Weighing};
+use motion::Motion;
+pub use parameters::DetectorParameters;
+
+/// After so long without sample the smoothed residuals begin anew, s.
+const GAP_SECS: f64 = 0.5;
+/// Time over which the time between samples is learned, in samples.
+const PERIOD_SAMPLES: f64 = 50.0;
+/// A contact within this time of the stream's begin was not seen to begin, s.
+const BEGIN_SECS: f64 = 0.3;
+
+/// Decides between contact and no contact, and learns each joint's bias. Part of [`Filter`](crate::Filter); alone it is
+/// for those who need no place. Deterministic; allocates nothing after construction.
+#[derive(Clone, Debug)]
+pub struct Detector {
+    parameters: DetectorParameters,
+    joints: Vec<JointDetector>,
+    charts: Charts,
+    motion: Motion,
+    blocks: Blocks,
+    /// First stamp of the stream, and of what came after the last time that a contact was forgotten.
+    begin_ns: Option<i64>,
+    last_ns: Option<i64>,
+    period_secs: f64,
+    weighing: Weighing,
+    quiet_secs: f64,
+    /// Where the robot was when the present contact began.
+    contact_position: Vec<f64>,
+    /// The link that each joint moves, and how many joints move that.
+    moved: Vec<(usize, usize)>,
+    bias: Vec<JointBias>,
+    detection: Detection,
+}
+
+impl Detector {
+    /// A detector for `robot`.
+    ///
+    /// # Errors
+    /// If a parameter is out of range.
+    pub fn new(robot: &Robot, parameters: &DetectorParameters) -> Result<Self, ParameterError> {
+        parameters.check()?;
+        let dof = robot.dof();
+        let moved = |joint: usize| {
+            let moves = |link: &Link| link.joint == Some(joint);
+            let link = robot.links.iter().position(moves).unwrap_or(0);
+            (link, robot.links[link].path.len())
+        };
+        let joint = JointDetector::new(parameters);
+        Ok(Self {
+            joints: vec![joint; dof],
+            charts: Charts::default(),
+            motion: Motion::new(dof),
+            blocks: Blocks::new(dof),
+            begin_ns: None,
+            last_ns: None,
+            period_secs: 0.01,
+            weighing: Weighing::default(),
+            quiet_secs: 0.0,
+            contact_position: vec![0.0; dof],
+            moved: (0..dof).map(moved).collect(),
+            bias: vec![JointBias::default(); dof],
+            detection: Detection {
+                joints: vec![false; dof],
+                ..Detection::default()
+            },
+            parameters: parameters.clone(),
+        })
+    }
+
+    /// What the last update found.
+    pub fn detection(&self) -> &Detection {
+        &self.detection
+    }
+
+    /// The bias of each joint, as of the last update.
+    pub fn bias(&self) -> &[JointBias] {
+        &self.bias
+    }
+
+    /// Whether the present contact may only be a bias: it was there when the stream began.
+    pub(crate) fn has_unseen_begin(&self) -> bool {
+        let begin_ns = self.begin_ns.unwrap_or(i64::MAX);
+        let since_ns = self.detection.since_ns;
+        since_ns.is_some_and(|since_ns| secs_between(begin_ns, since_ns) < BEGIN_SECS)
+    }
+
+    /// Takes other parameters over and forgets the present contact; bias and noise stay.
+    ///
+    /// # Errors
+    /// If a parameter is out of range; then all stays as it was.
+    pub fn set_parameters(
+        &mut self,
+        parameters: &DetectorParameters,
+    ) -> Result<(), ParameterError> {
+        parameters.check()?;
+        self.parameters = parameters.clone();
+        (self.joints.iter_mut()).for_each(|joint| joint.set_least_torque(parameters.least_torque));
+        self.forget_contact();
+        Ok(())
+    }
+
+    /// Sets the biases, as after a tare; ends what seemed a contact.
+    pub(crate) fn set_bias(&mut self, bias: impl Fn(usize) -> JointBias) {
+        for (index, joint) in self.joints.iter_mut().enumerate() {
+            joint.set_bias(bias(index));
+        }
+        self.blocks.clear();
+        if self.detection.in_contact {
+            self.end(self.last_ns.unwrap_or_default());
+        }
+        self.tell_bias();
+    }
+
+    /// Takes one sample in.
+    pub fn update(&mut self, sample: Admitted<'_>) -> &Detection {
+        let JointSample {
+            stamp_ns,
+            position,
+            external_torque,
+        } = sample.sample();
+        let stamp_ns = *stamp_ns;
+        let step_secs = self.advance(stamp_ns, position);
+        self.weighing = self.weighing_at(stamp_ns, position);
+        let weighing = self.weighing;
+        for (joint, &torque) in self.joints.iter_mut().zip(external_torque) {
+            joint.look(torque, step_secs, &self.charts);
+            joint.weigh(stamp_ns, &self.charts, &weighing);
+        }
+        self.detection.event = None;
+        match self.detection.in_contact {
+            true => self.watch_for_end(stamp_ns, step_secs),
+            false => self.watch_for_start(stamp_ns, position, step_secs),
+        }
+        self.tell_joints();
+        self.tell_bias();
+        &self.detection
+    }
+
+    /// Takes the stamp and position in; tells the time since the last sample, s, which is above zero.
+    fn advance(&mut self, stamp_ns: i64, position: &[f64]) -> f64 {
+        let last_ns = self.last_ns.replace(stamp_ns);
+        let step_secs = last_ns.map_or(0.0, |last_ns| secs_between(last_ns, stamp_ns));
+        let goes_on = step_secs > 0.0 && step_secs <= GAP_SECS;
+        self.begin_ns.get_or_insert(stamp_ns);
+        if !goes_on {
+            self.charts.begin();
+            self.motion.begin(position);
+            self.blocks.clear();
+            self.joints.iter_mut().for_each(JointDetector::begin);
+            return self.period_secs;
+        }
+        self.period_secs += (step_secs - self.period_secs) / PERIOD_SAMPLES;
+        self.charts.advance(step_secs);
+        self.motion.update(position, step_secs);
+        step_secs
+    }
+
+    fn weighing_at(&self, stamp_ns: i64, position: &[f64]) -> Weighing {
+        let looks = 3600.0 / self.period_secs * (self.joints.len() * joint::SCALES.len()) as f64;
+        let frozen_variance = self.detection.since_ns.map_or(0.0, |since_ns| {
+            let secs = secs_between(since_ns, stamp_ns).max(0.0);
+            bias::frozen_variance(distance(position, &self.contact_position), secs)
+        });
+        Weighing {
+            threshold: alarm::threshold(self.parameters.false_alarms_per_hour, looks),
+            x2: self.motion.quickness().powi(2),
+            frozen_variance,
+        }
+    }
+
+    /// How far the joint that speaks most for a contact is beyond its threshold: 1 is at it.
+    fn ratio(&self) -> f64 {
+        (self.joints.iter()).fold(0.0, |most, joint| f64::max(most, joint.ratio))
+    }
+
+    fn watch_for_start(&mut self, stamp_ns: i64, position: &[f64], step_secs: f64) {
+        let ratio = self.ratio();
+        if ratio < 1.0 {
+            return self.learn(stamp_ns, step_secs, ratio);
+        }
+        let loud = (self.joints.iter()).filter(|joint| joint.ratio >= 1.0);
+        let strongest = loud.max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+        let Some(since_ns) = strongest.and_then(|joint| joint.stirred_ns) else {
+            return;
+        };
+        let lasted_secs = secs_between(since_ns, stamp_ns);
+        // One sample alone is no contact.
+        if lasted_secs > 0.0 && lasted_secs + 1e-9 >= self.parameters.min_secs {
+            self.start(stamp_ns, since_ns, position);
+        }
+    }
+
+    /// Learns noise and bias from a sample without contact.
+    fn learn(&mut self, stamp_ns: i64, step_secs: f64, ratio: f64) {
+        // What may be a contact's begin counts less (Tukey's biweight).
+        let trust = (1.0 - ratio * ratio).powi(2);
+        let forgetting = Forgetting::new(&self.parameters, step_secs, self.motion.speed());
+        let (x2, motion_std) = (self.weighing.x2, self.parameters.motion_std);
+        (self.blocks).take(stamp_ns, step_secs, x2, &mut self.joints, motion_std);
+        for joint in &mut self.joints {
+            joint.learn_bias(trust, forgetting);
+        }
+    }
+
+    fn start(&mut self, stamp_ns: i64, since_ns: i64, position: &[f64]) {
+        self.blocks.restore(since_ns, &mut self.joints);
+        self.contact_position.copy_from_slice(position);
+        self.quiet_secs = 0.0;
+        self.detection.in_contact = true;
+        self.detection.since_ns = Some(since_ns);
+        self.detection.first_link = None;
+        self.detection.event = Some(ContactEvent {
+            change: ContactChange::Start,
+            stamp_ns: since_ns,
+            noticed_ns: stamp_ns,
+            confidence: self.confidence(),
+        });
+    }
+
+    fn watch_for_end(&mut self, stamp_ns: i64, step_secs: f64) {
+        let share = self.parameters.release_share;
+        let is_quiet = self.joints.iter().all(|joint| joint.release_ratio < share);
+        self.quiet_secs = if is_quiet {
+            self.quiet_secs + step_secs
+        } else {
+            0.0
+        };
+        if self.quiet_secs > self.parameters.release_secs {
+            self.end(stamp_ns);
+        }
+    }
+
+    fn end(&mut self, stamp_ns: i64) {
+        let quiet_ns = (self.quiet_secs * 1e9) as i64;
+        self.detection.in_contact = false;
+        self.detection.since_ns = None;
+        self.detection.first_link = None;
+        self.detection.event = Some(ContactEvent {
+            change: ContactChange::End,
+            stamp_ns: stamp_ns.saturating_sub(quiet_ns),
+            noticed_ns: stamp_ns,
+            confidence: (self.joints.iter())
+                .map(JointDetector::freedom)
+                .fold(1.0, f64::min),
+        });
+        self.blocks.clear();
+        for joint in &mut self.joints {
+            joint.thaw(self.weighing.frozen_variance);
+        }
+    }
+
+    fn confidence(&self) -> f64 {
+        let z = self.weighing.threshold;
+        alarm::confidence(self.parameters.false_alarms_per_hour, z, self.ratio())
+    }
+
+    fn tell_joints(&mut self) {
+        let in_contact = self.detection.in_contact;
+        self.detection.confidence = match in_contact {
+            true => self.detection.confidence.max(self.confidence()),
+            false => 0.0,
+        };
+        let depth = |joint: usize| self.moved[joint].1;
+        let mut last = None;
+        for (index, joint) in self.joints.iter().enumerate() {
+            let feels = in_contact && joint.ratio >= 1.0;
+            self.detection.joints[index] = feels;
+            if feels && last.is_none_or(|known| depth(known) < depth(index)) {
+                last = Some(index);
+            }
+        }
+        let Some((link, depth)) = last.map(|joint| self.moved[joint]) else {
+            return;
+        };
+        let known = self.detection.first_link;
+        let is_known = |moved: &&(usize, usize)| Some(moved.0) == known;
+        let known_depth = self.moved.iter().find(is_known).map_or(0, |moved| moved.1);
+        if depth > known_depth {
+            self.detection.first_link = Some(link);
+        }
+    }
+
+    fn tell_bias(&mut self) {
+        for (bias, joint) in self.bias.iter_mut().zip(&self.joints) {
+            *bias = joint.bias(&self.charts, &self.weighing);
+        }
+    }
+
+    /// Forgets everything learned.
+    pub fn reset(&mut self) {
+        self.joints.fill(JointDetector::new(&self.parameters));
+        self.charts.begin();
+        self.blocks.clear();
+        self.blocks.forget();
+        self.last_ns = None;
+        self.quiet_secs = 0.0;
+        self.bias.fill(JointBias::default());
+        self.forget_contact();
+    }
+
+    /// Forgets the present contact; bias and noise stay.
+    pub fn forget_contact(&mut self) {
+        self.begin_ns = None;
+        self.quiet_secs = 0.0;
+        self.detection.joints.fill(false);
+        self.detection = Detection {
+            joints: std::mem::take(&mut self.detection.joints),
+            ..Detection::default()
+        };
+    }
+}
+
+/// Euclidean distance of two positions, rad.
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+    squares.sum::<f64>().sqrt()
+}
+
+/// Time from one stamp to another, s.
+fn secs_between(from_ns: i64, to_ns: i64) -> f64 {
+    to_ns.saturating_sub(from_ns) as f64 * 1e-9
+}
