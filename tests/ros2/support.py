@@ -10,6 +10,7 @@ from pathlib import Path
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -20,6 +21,8 @@ LIMIT_SECS = 30.0
 # Of the tests with a simulated bag.
 PARTICLES = 200
 SAMPLES = 600
+
+LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 _domains = itertools.count(os.getpid())
 
@@ -86,6 +89,18 @@ class Peer:
             assert time.monotonic() < end, f"waited {limit_secs} s in vain for {what}"
             self.executor.spin_once(0.02)
 
+    def call(self, kind, name, **fields):
+        """What a service answers."""
+        future = self.ask(kind, name, **fields)
+        self.wait_until(future.done, f"an answer from {name}")
+        return future.result()
+
+    def ask(self, kind, name, **fields):
+        """Calls a service, and gives what will hold its answer."""
+        client = self.node.create_client(kind, name)
+        self.wait_until(client.service_is_ready, f"the service {name}")
+        return client.call_async(kind.Request(**fields))
+
     def counts(self, diagnostics):
         """The newest values on /diagnostics, by name."""
         seen = len(diagnostics)
@@ -96,10 +111,10 @@ class Peer:
 class Arm:
     """A driver's two topics, with the arm at rest unless told otherwise."""
 
-    def __init__(self, peer, qos=10):
+    def __init__(self, peer, qos=10, namespace=""):
         self.peer = peer
-        self.positions = peer.node.create_publisher(JointState, "joint_states", qos)
-        self.torques = peer.node.create_publisher(JointState, "external_torque", qos)
+        self.positions = peer.node.create_publisher(JointState, f"{namespace}joint_states", qos)
+        self.torques = peer.node.create_publisher(JointState, f"{namespace}external_torque", qos)
         # What the driver's clock is ahead by, and its last stamp.
         self.offset_ns = 0
         self.stamp_ns = 0
@@ -110,7 +125,7 @@ class Arm:
     def wait_until_heard(self):
         self.peer.wait_until(self.is_heard, "the node to subscribe")
 
-    def send(self, positions=None, torques=None, names=JOINTS, stamp_ns=None):
+    def send(self, positions=None, torques=None, names=JOINTS, stamp_ns=None, torque_ahead_ns=0):
         """Sends one message on each topic, stamped now unless told otherwise."""
         if stamp_ns is None:
             self.stamp_ns = stamp_ns = time.time_ns() + self.offset_ns
@@ -118,14 +133,14 @@ class Arm:
         state = joint_state(stamp_ns, names)
         state.position = zeros if positions is None else positions
         self.positions.publish(state)
-        effort = joint_state(stamp_ns, names)
+        effort = joint_state(stamp_ns + torque_ahead_ns, names)
         effort.effort = zeros if torques is None else torques
         self.torques.publish(effort)
 
-    def send_until(self, condition, what):
-        """Keeps sending good messages until `condition()` holds."""
+    def send_until(self, condition, what, **message):
+        """Keeps sending the same message until `condition()` holds."""
         def sent():
-            self.send()
+            self.send(**message)
             return condition()
         self.peer.wait_until(sent, what)
 

@@ -7,14 +7,12 @@ import struct
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped, WrenchStamped
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Bool
-from support import PARTICLES, SAMPLES, URDF, palpate, play
+from support import JOINTS, LATCHED, PARTICLES, SAMPLES, URDF, palpate, play
 from visualization_msgs.msg import Marker, MarkerArray
 
 LINK, LINK_INDEX = "lbr_link_4", 4
-LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @pytest.fixture(scope="session")
@@ -34,6 +32,8 @@ def test_a_touch_is_located_drawn_and_counted(peer, domain, start, bag, paramete
     detected = peer.listen(Bool, "palpate/contact_detected", LATCHED)
     clouds = peer.listen(PointCloud2, "palpate/particles")
     pictures = peer.listen(MarkerArray, "palpate/markers")
+    residuals = peer.listen(JointState, "palpate/residual", SAMPLES)
+    probabilities = peer.listen(JointState, "palpate/link_probabilities", SAMPLES)
     diagnostics = peer.listen(DiagnosticArray, "/diagnostics")
     player = play(bag, domain, *options)
     peer.wait_until(lambda: player.poll() is not None, "the player to end", limit_secs=60.0)
@@ -56,8 +56,26 @@ def test_a_touch_is_located_drawn_and_counted(peer, domain, start, bag, paramete
         assert row["link"], row
         position = message.pose.pose.position
         assert math.dist((position.x, position.y, position.z), [float(row[axis]) for axis in "xyz"]) < 1e-5, row
+    check_details(residuals, probabilities)
+    check_figures(peer.counts(diagnostics))
     # Both see the contact for as long.
     assert len(poses) == sum(row["status"] != "none" for row in replayed.values())
+
+
+def check_details(residuals, probabilities):
+    assert all(message.name == JOINTS for message in residuals)
+    assert len(residuals) == len(probabilities) == SAMPLES
+    assert math.hypot(*residuals[-1].effort) < 0.5, "the contact found does not explain the torques"
+    assert sum(probabilities[0].position) == 0.0
+    at_the_end = dict(zip(probabilities[-1].name, probabilities[-1].position))
+    assert max(at_the_end, key=at_the_end.get) == LINK and sum(at_the_end.values()) <= 1.0 + 1e-9
+
+
+def check_figures(counts):
+    assert counts["particles"] == str(PARTICLES) and counts["seed"] == "5"
+    assert 1.0 <= float(counts["effective sample size"]) <= PARTICLES
+    assert 0.0 < float(counts["spread of the particles, m"]) < 0.5
+    assert counts["age of the tare, s"] == "none"
 
 
 def stamp_ns(message):
