@@ -1,6 +1,7 @@
 # Source this from bash to have a ROS 2: the one that is already sourced, else a small one that is installed from
 # Python wheels into .ros2/ at the repository's root, without root rights and once only. Needs python3 with venv and a
-# C compiler. Ends the sourcing shell's command with a non-zero status, and a sentence, where that fails.
+# C and C++ compiler. Where the drivers' messages are not found, packages with messages of the same shape are built into
+# .ros2/messages, so that the node can be built and tested with them. Ends the sourcing shell's command with a non-zero status, and a sentence, where that fails.
 
 _palpate_install_ros2() (
     set -euo pipefail
@@ -52,13 +53,42 @@ _palpate_use_wheels() {
     export LIBCLANG_PATH BINDGEN_EXTRA_CLANG_ARGS
 }
 
+_palpate_build_messages() (
+    set -euo pipefail
+    root=$1 prefix=$1/.ros2/messages log=$1/.ros2/messages.log
+    stamp="$AMENT_PREFIX_PATH $(cat "$root"/tests/ros2_messages.py "$root"/tests/ros2/messages/*/msg/*.msg | cksum)"
+    [ "$(cat "$prefix/stamp" 2>/dev/null)" = "$stamp" ] && return 0
+
+    echo "building the drivers' messages into $prefix" >&2
+    mkdir -p "$root/.ros2"
+    "${PYTHON:-python3}" "$root/tests/ros2_messages.py" "$root/tests/ros2/messages" "$prefix" >"$log" 2>&1 || {
+        cat "$log" >&2
+        return 1
+    }
+    printf '%s' "$stamp" >"$prefix/stamp"
+)
+
+_palpate_use_messages() {
+    local prefix=$1/.ros2/messages
+    export AMENT_PREFIX_PATH=$prefix:$AMENT_PREFIX_PATH
+    export LD_LIBRARY_PATH=$prefix/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
+    export PYTHONPATH=$prefix/lib/python${PYTHONPATH:+:$PYTHONPATH}
+}
+
+_palpate_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 if [ -n "${AMENT_PREFIX_PATH:-}" ]; then
     echo "using the ROS 2 that is sourced: ${ROS_DISTRO:-of unknown name}" >&2
 else
-    _palpate_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
     if ! _palpate_install_ros2 "$_palpate_root"; then
         echo "no ROS 2 is sourced, and installing one into $_palpate_root/.ros2 failed" >&2
         return 1
     fi
     _palpate_use_wheels "$_palpate_root"
+fi
+if [[ ":$AMENT_PREFIX_PATH:" != *":$_palpate_root/.ros2/messages:"* ]]; then
+    if ! _palpate_build_messages "$_palpate_root"; then
+        echo "building the drivers' messages into $_palpate_root/.ros2/messages failed" >&2
+        return 1
+    fi
+    _palpate_use_messages "$_palpate_root"
 fi

@@ -99,6 +99,7 @@ impl Diagnostics {
             now: losses,
             age_secs,
             is_disabled: progress.is_disabled,
+            is_together: settings.input.source.has_both(),
         });
         let mut values = counts(observed, &progress, &losses);
         values.extend([
@@ -107,6 +108,7 @@ impl Diagnostics {
             pair("samples used, Hz", format!("{:.1}", rates.used)),
             pair("age of the newest sample, s", seconds(age_secs)),
         ]);
+        values.extend(delays(observed.input));
         values.extend(figures(settings, &progress));
         DiagnosticStatus {
             level: match level {
@@ -135,7 +137,10 @@ fn look(progress: &Mutex<Progress>) -> Progress {
 
 fn losses(observed: &Observed<'_>, progress: &Progress) -> Losses {
     let (messages, intake) = (observed.input.counts(), progress.intake);
-    let refused = messages.joints_missing + messages.wrong_length + messages.stamp_not_after;
+    let refused = messages.joints_missing
+        + messages.wrong_length
+        + messages.stamp_not_after
+        + messages.unreadable;
     Losses {
         positions: messages.positions,
         torques: messages.torques,
@@ -160,6 +165,7 @@ fn counts(observed: &Observed<'_>, progress: &Progress, losses: &Losses) -> Vec<
         ("positions without torque", pairing.position_without_torque),
         ("refused, joint missing", messages.joints_missing),
         ("refused, wrong length", wrong_length),
+        ("refused, unreadable", messages.unreadable),
         ("refused, not finite", intake.not_finite),
         ("refused, too large", intake.too_large),
         ("refused, stamp not after", stamp_not_after),
@@ -167,6 +173,23 @@ fn counts(observed: &Observed<'_>, progress: &Progress, losses: &Losses) -> Vec<
     ]
     .map(|(key, count)| pair(key, count))
     .to_vec()
+}
+
+/// How the clocks differ, as far as the messages tell.
+fn delays(input: &JointInput) -> [KeyValue; 4] {
+    let delays = input.delays();
+    let secs = |ns: Option<i64>| seconds(ns.map(|ns| ns as f64 * 1e-9));
+    let between = (delays.torque_ns.zip(delays.position_ns))
+        .map(|(torque_ns, position_ns)| torque_ns.saturating_sub(position_ns));
+    [
+        pair("position stamps behind now, s", secs(delays.position_ns)),
+        pair("torque stamps behind now, s", secs(delays.torque_ns)),
+        pair("torque stamps behind positions', s", secs(between)),
+        pair(
+            "controller's clock behind now, s",
+            secs(delays.controller_ns),
+        ),
+    ]
 }
 
 fn figures(settings: &Settings, progress: &Progress) -> [KeyValue; 9] {

@@ -78,6 +78,8 @@ pub struct Health {
     pub age_secs: Option<f64>,
     /// Whether the node was told not to estimate.
     pub is_disabled: bool,
+    /// Whether positions come in the torques' messages.
+    pub is_together: bool,
 }
 
 /// Level and reason; the most serious first.
@@ -85,7 +87,7 @@ pub fn judge(health: &Health) -> (Level, &'static str) {
     let (before, now) = (&health.before, &health.now);
     if health.is_disabled {
         (Level::Ok, "disabled")
-    } else if now.positions == before.positions {
+    } else if now.positions == before.positions && !health.is_together {
         (Level::Error, "no messages on joint_states")
     } else if now.torques == before.torques {
         (Level::Error, "no messages on external_torque")
@@ -137,6 +139,7 @@ mod tests {
             },
             age_secs: Some(0.01),
             is_disabled: false,
+            is_together: false,
         };
         change(&mut health);
         judge(&health)
@@ -164,6 +167,8 @@ mod tests {
             assert_eq!(found, level, "{reason}");
             assert!(reason.contains(words), "{reason}");
         }
+        let silent = |at: &mut Health| (at.now, at.is_together) = (BEFORE, true);
+        assert_eq!(said(silent).1, "no messages on external_torque");
         let all_refused = |at: &mut Health| (at.now.used, at.now.refused) = (50, 9);
         assert_eq!(
             said(all_refused),

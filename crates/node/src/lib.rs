@@ -6,11 +6,11 @@ mod joint_input;
 mod newest;
 mod parameter_names;
 mod throttle;
+mod untyped;
 
 pub use health::{Health, Level, Losses, Rates, judge};
-pub use joint_input::{
-    JointInput, JointMessage, MessageCounts, MessageError, TimedSample, nanoseconds,
-};
+pub use joint_input::{Delays, JointInput, MessageCounts, MessageError, TimedSample, nanoseconds};
 pub use newest::Newest;
 pub use parameter_names::{as_listed, within_prefixes};
 pub use throttle::Throttle;
+pub use untyped::Untyped;

@@ -65,6 +65,7 @@ fn start() -> anyhow::Result<Started> {
     let node =
         r2r::Node::create(create_context()?, "palpate", "").context("cannot create the node")?;
     let settings = parameters::read(&node)?;
+    reader::check_source(&settings.input)?;
     Ok((node, settings, stop))
 }
 

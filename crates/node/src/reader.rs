@@ -4,27 +4,38 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use futures::{FutureExt, Stream, StreamExt};
-use palpate_filter::InputSettings;
-use palpate_model::Robot;
-use palpate_node::{
-    JointInput, JointMessage, MessageError, Newest, Throttle, TimedSample, nanoseconds,
-};
-use r2r::QosProfile;
-use r2r::sensor_msgs::msg::JointState;
-
-use crate::messages;
+use palpate_filter::{InputSettings, ParameterError};
+use palpate_model::{JointReading, Robot, Source};
+use palpate_node::{JointInput, MessageError, Newest, Throttle, TimedSample, Untyped, nanoseconds};
+use r2r::{QosProfile, WrappedNativeMsgUntyped};
+use serde_json::Value;
 
 /// Messages that the middleware keeps for a reader that is late.
 const DEPTH: usize = 100;
 
-/// Takes both topics in. Best effort, as that reads reliable and best-effort publishers alike.
+/// Takes the driver's topics in. Best effort, as that reads reliable and best-effort publishers alike.
 pub struct Reader {
-    positions: Box<dyn Stream<Item = JointState> + Unpin>,
-    torques: Box<dyn Stream<Item = JointState> + Unpin>,
+    source: Source,
+    /// None where the torques' messages hold positions too.
+    positions: Option<Messages>,
+    torques: Messages,
     pub input: JointInput,
     samples: Arc<Newest<TimedSample>>,
     max_wait_ns: i64,
     complaints: Throttle,
+}
+
+type Messages = Box<dyn Stream<Item = r2r::Result<Value>> + Unpin>;
+
+/// Refuses a source whose messages were not there when this was built.
+pub fn check_source(settings: &InputSettings) -> Result<(), ParameterError> {
+    let type_name = settings.source.type_name();
+    let known = WrappedNativeMsgUntyped::new_from(type_name).is_ok();
+    known.then_some(()).ok_or_else(|| ParameterError::Range {
+        name: "input.source",
+        expected: "one whose messages were on the prefix path when this node was built",
+        found: format!("{}, whose message is {type_name}", settings.source.word()),
+    })
 }
 
 impl Reader {
@@ -34,10 +45,15 @@ impl Reader {
         settings: &InputSettings,
         samples: Arc<Newest<TimedSample>>,
     ) -> r2r::Result<Self> {
-        let qos = QosProfile::sensor_data().keep_last(DEPTH);
+        let source = settings.source;
+        let positions = match source.has_both() {
+            true => None,
+            false => Some(subscribe(node, "joint_states", Source::JointState)?),
+        };
         Ok(Self {
-            positions: Box::new(node.subscribe("joint_states", qos.clone())?),
-            torques: Box::new(node.subscribe("external_torque", qos)?),
+            source,
+            positions,
+            torques: subscribe(node, "external_torque", source)?,
             input: JointInput::new(robot, settings),
             samples,
             max_wait_ns: nanoseconds(settings.max_wait_secs),
@@ -51,16 +67,16 @@ impl Reader {
         self.max_wait_ns = nanoseconds(settings.max_wait_secs);
     }
 
-    /// Takes all that has come: r2r itself would drop the newest.
-    pub fn drain(&mut self) {
-        while let Some(Some(message)) = self.positions.next().now_or_never() {
-            let taken = self
-                .input
-                .position(joint_message(&message, &message.position));
+    /// Takes all that has come by the node's time `now_ns`: r2r itself would drop the newest.
+    pub fn drain(&mut self, now_ns: Option<i64>) {
+        while let Some(message) = self.positions.as_mut().and_then(next) {
+            let reading = read(Source::JointState, message);
+            let taken = self.input.position(reading.as_ref(), now_ns);
             self.hand_on(taken);
         }
-        while let Some(Some(message)) = self.torques.next().now_or_never() {
-            let taken = self.input.torque(joint_message(&message, &message.effort));
+        while let Some(message) = next(&mut self.torques) {
+            let reading = read(self.source, message);
+            let taken = self.input.torque(reading.as_ref(), now_ns);
             self.hand_on(taken);
         }
     }
@@ -80,10 +96,21 @@ impl Reader {
     }
 }
 
-fn joint_message<'a>(message: &'a JointState, values: &'a [f64]) -> JointMessage<'a> {
-    JointMessage {
-        stamp_ns: messages::nanoseconds(&message.header.stamp),
-        names: &message.name,
-        values,
-    }
+fn subscribe(node: &mut r2r::Node, topic: &str, source: Source) -> r2r::Result<Messages> {
+    let qos = QosProfile::sensor_data().keep_last(DEPTH);
+    Ok(Box::new(node.subscribe_untyped(
+        topic,
+        source.type_name(),
+        qos,
+    )?))
+}
+
+fn next(messages: &mut Messages) -> Option<r2r::Result<Value>> {
+    messages.next().now_or_never().flatten()
+}
+
+fn read(source: Source, message: r2r::Result<Value>) -> Option<JointReading> {
+    message
+        .ok()
+        .and_then(|message| source.read(Untyped(&message)))
 }

@@ -70,7 +70,7 @@ pub fn run(
         let orders = at_work.as_ref().map(|at_work| &at_work.orders);
         services.serve(orders, settings.input.tare_secs);
         if let Some(at_work) = &mut at_work {
-            at_work.reader.drain();
+            at_work.reader.drain(clock.now_ns());
         }
         let refusal = descriptions.as_ref().and_then(Descriptions::refusal);
         let observed = at_work.as_ref().map(AtWork::observed);
