@@ -65,6 +65,32 @@ pub(crate) fn choose(bag: &Bag, robot: &Robot, choice: &TopicChoice) -> Result<C
     Ok(Chosen { positions, torques })
 }
 
+/// Finds the topic of `JointState` that has measured torques beside positions.
+pub(crate) fn choose_measured(
+    bag: &Bag,
+    robot: &Robot,
+    choice: &TopicChoice,
+) -> Result<usize, BagError> {
+    let named = |name: &Option<String>| name.as_deref().map(|name| bag.topic(name)).transpose();
+    let (positions, torques) = (named(&choice.positions)?, named(&choice.torques)?);
+    let fits = |topic: &Fitness| {
+        topic.source == Some(Source::JointState) && topic.positions && topic.efforts
+    };
+    let fitness = fitness(bag, robot, choice)?;
+    let fitting = match (positions, torques) {
+        (None, None) => fitting(&fitness, fits),
+        (Some(positions), Some(torques)) if positions != torques => Vec::new(),
+        (Some(topic), _) | (None, Some(topic)) => vec![topic],
+    };
+    the_only(
+        bag,
+        &fitness,
+        "joint positions with measured torques beside them",
+        "--positions",
+        &fitting,
+    )
+}
+
 fn find_torques(bag: &Bag, fitness: &[Fitness], source: Option<Source>) -> Result<usize, BagError> {
     let all: Vec<_> = (0..fitness.len())
         .filter(|&topic| holds_external_torques(&bag.topics()[topic].name, &fitness[topic]))

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use palpate_filter::{
     CLOUD_FIELDS, CLOUD_POINT_STEP, CloudPoint, ContactEstimate, ContactPose, Scene, pack_cloud,
 };
-use palpate_model::{JointSample, Kinematics, Robot};
+use palpate_model::{JointSample, Kinematics, MeasuredSample, Robot};
 
 use crate::message::*;
 use crate::{BagError, BagWriter};
@@ -77,6 +77,19 @@ impl BagWriter {
         };
         self.write(topics::JOINT_STATES, sample.stamp_ns, &positions)?;
         self.write(topics::EXTERNAL_TORQUES, sample.stamp_ns, &torques)
+    }
+
+    /// Writes positions, speeds and measured torques, as most drivers report them.
+    pub fn measured(&mut self, robot: &Robot, sample: &MeasuredSample) -> Result<(), BagError> {
+        let names = robot.joints.iter().map(|joint| joint.name.clone());
+        let state = JointState {
+            header: Header::new(sample.stamp_ns, ""),
+            name: names.collect(),
+            position: sample.position.clone(),
+            velocity: sample.velocity.clone(),
+            effort: sample.torque.clone(),
+        };
+        self.write(topics::JOINT_STATES, sample.stamp_ns, &state)
     }
 
     /// Writes the pose of every link in its parent.

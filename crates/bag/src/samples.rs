@@ -1,7 +1,8 @@
 //! From a bag's messages to the robot's samples.
 
 use palpate_model::{
-    JointPicker, JointReading, JointSample, ModelError, Pairing, PairingLosses, Robot,
+    JointPicker, JointReading, JointSample, MeasuredSample, ModelError, Pairing, PairingLosses,
+    Robot,
 };
 
 use crate::BagError;
@@ -181,16 +182,16 @@ fn nothing_read(recording: &Recording) -> BagError {
 }
 
 /// Reads one topic.
-struct Reader<'a> {
+pub(crate) struct Reader<'a> {
     robot: &'a Robot,
     topic: usize,
     decoder: Decoder,
     picker: JointPicker,
-    report: TopicReport,
+    pub(crate) report: TopicReport,
 }
 
 impl<'a> Reader<'a> {
-    fn new(
+    pub(crate) fn new(
         bag: &Bag,
         robot: &'a Robot,
         joint_names: &[String],
@@ -215,17 +216,37 @@ impl<'a> Reader<'a> {
         message: &Message,
         wanted: [Quantity; COUNT],
     ) -> Option<(i64, [Vec<f64>; COUNT])> {
+        self.read_by(message, |reader, reading, stamp_ns| {
+            Ok((stamp_ns, reader.pick(reading, wanted)?))
+        })
+    }
+
+    /// Positions, speeds if there are any, and torques; none if the message is another topic's, or unusable.
+    pub(crate) fn read_measured(&mut self, message: &Message) -> Option<MeasuredSample> {
+        self.read_by(message, |reader, reading, stamp_ns| {
+            reading
+                .measured(reader.robot, &mut reader.picker, stamp_ns)
+                .map_err(|(what, error)| Refusal::Joints(what, error))
+        })
+    }
+
+    /// What `take` makes of the decoded message and its stamp (ns).
+    fn read_by<T>(
+        &mut self,
+        message: &Message,
+        take: impl FnOnce(&mut Self, &JointReading, i64) -> Result<T, Refusal>,
+    ) -> Option<T> {
         if message.topic != self.topic {
             return None;
         }
         self.report.messages += 1;
         let read = self.decoder.decode(&message.data).and_then(|reading| {
             let stamp_ns = reading.stamp_ns.unwrap_or(message.log_time_ns);
-            Ok((stamp_ns, self.pick(&reading, wanted)?))
+            let stamp_ns = stamp_ns.clamp(-STAMP_LIMIT_NS, STAMP_LIMIT_NS);
+            take(self, &reading, stamp_ns)
         });
         read.inspect_err(|refusal| self.report.unusable.count(refusal))
             .ok()
-            .map(|(stamp_ns, values)| (stamp_ns.clamp(-STAMP_LIMIT_NS, STAMP_LIMIT_NS), values))
     }
 
     fn pick<const COUNT: usize>(

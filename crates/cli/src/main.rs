@@ -5,6 +5,7 @@ mod estimates_csv;
 mod evaluate;
 mod inspect;
 mod last_second;
+mod measured;
 mod picture;
 mod progress;
 mod recorder;

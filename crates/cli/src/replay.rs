@@ -5,16 +5,16 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use palpate_bag::{Bag, Recording, TopicChoice, TopicReport, read_samples};
+use palpate_bag::{Bag, Recording, TopicChoice, TopicReport, read_measured, read_samples};
 use palpate_filter::{ContactStatus, Filter, Settings};
-use palpate_model::{JointSample, Robot, Source};
+use palpate_model::{ExternalTorque, JointSample, Robot, Source};
 
 use crate::estimates_csv::EstimatesCsv;
 use crate::last_second::LastSecond;
 use crate::recorder::Recorder;
 use crate::robot_args::RobotArgs;
 use crate::track::{Track, track};
-use crate::{Usage, progress, read_text, table};
+use crate::{Usage, measured, progress, read_text, table};
 
 /// Estimate the contacts of a recorded bag
 ///
@@ -43,7 +43,8 @@ pub struct Replay {
     /// Topic of the joint positions [default: the only one that fits]
     #[arg(long, value_name = "TOPIC")]
     positions: Option<String>,
-    /// Topic of the external joint torques, gravity removed [default: the only one that fits]
+    /// Topic of the external joint torques, gravity removed [default: the only one that fits]. With `torque.source` other
+    /// than external, measured torques are taken from the topic of the positions instead
     #[arg(long, value_name = "TOPIC")]
     torques: Option<String>,
     /// Number of threads; 0 for one a core
@@ -66,7 +67,8 @@ impl Replay {
         settings.seed = self.seed.unwrap_or(settings.seed);
         set_threads(self.threads)?;
         let (robot, _) = (self.robot).load(&settings.robot, &settings.robot.load_options())?;
-        let recording = self.read(&robot, &settings)?;
+        let mut external = settings.torque.external_torque(&robot)?;
+        let recording = self.read(&robot, &settings, external.as_mut())?;
         let csv = self
             .estimates
             .as_deref()
@@ -92,7 +94,8 @@ impl Replay {
         }
         if !self.quiet {
             let wall_secs = start.elapsed().as_secs_f64();
-            table::print(&table::facts(&facts(&robot, &recording, &track, wall_secs)))?;
+            let facts = facts(&robot, &recording, external.as_ref(), &track, wall_secs);
+            table::print(&table::facts(&facts))?;
         }
         Ok(())
     }
@@ -123,7 +126,13 @@ impl Replay {
         Ok(Some(recorder))
     }
 
-    fn read(&self, robot: &Robot, settings: &Settings) -> Result<Recording> {
+    /// The bag's samples, with external torques as they are in it, or made of measured ones by `external`.
+    fn read(
+        &self,
+        robot: &Robot,
+        settings: &Settings,
+        external: Option<&mut ExternalTorque>,
+    ) -> Result<Recording> {
         let whose = || format!("bag {}", self.bag.display());
         let bag = Bag::open(&self.bag)?;
         let choice = TopicChoice {
@@ -134,7 +143,13 @@ impl Replay {
             joint_names: settings.input.unnamed_joints(),
         };
         let tolerance_ns = (settings.input.pairing_tolerance_secs * 1e9).round() as i64;
-        let recording = read_samples(&bag, robot, &choice, tolerance_ns).with_context(whose)?;
+        let recording = match external {
+            None => read_samples(&bag, robot, &choice, tolerance_ns),
+            Some(external) => read_measured(&bag, robot, &choice).and_then(|measured| {
+                measured::recording(external, measured, settings.input.time_jump_secs)
+            }),
+        }
+        .with_context(whose)?;
         for topic in [&recording.positions, &recording.torques] {
             if let Some(reason) = &topic.unusable.first_reason {
                 let count = topic.unusable.total();
@@ -159,11 +174,11 @@ pub fn set_threads(threads: usize) -> Result<()> {
 fn facts(
     robot: &Robot,
     recording: &Recording,
+    external: Option<&ExternalTorque>,
     track: &Track,
     wall_secs: f64,
 ) -> Vec<(&'static str, String)> {
     let counts = track.counts;
-    let losses = recording.losses;
     let share = |status| {
         format!(
             "{} {:.1} %",
@@ -172,16 +187,9 @@ fn facts(
         )
     };
     let span_secs = track.span_secs();
-    let mut facts = vec![
-        ("joint positions", told(&recording.positions)),
-        ("external torques", told(&recording.torques)),
-        (
-            "unpaired",
-            format!(
-                "{} torques without position, {} positions without torque",
-                losses.torque_without_position, losses.position_without_torque
-            ),
-        ),
+    let mut facts = vec![("joint positions", told(&recording.positions))];
+    facts.extend(torque_facts(recording, external));
+    facts.extend([
         (
             "samples",
             format!(
@@ -203,7 +211,7 @@ fn facts(
             .map(share)
             .join(", "),
         ),
-    ];
+    ]);
     if track.restarts > 0 {
         facts.push(("time started anew", format!("{} times", track.restarts)));
     }
@@ -217,6 +225,25 @@ fn facts(
         ),
     ));
     facts
+}
+
+/// Where the torques came from.
+fn torque_facts(
+    recording: &Recording,
+    external: Option<&ExternalTorque>,
+) -> Vec<(&'static str, String)> {
+    if let Some(external) = external {
+        return vec![("measured torques", measured::told(external))];
+    }
+    let losses = recording.losses;
+    let unpaired = format!(
+        "{} torques without position, {} positions without torque",
+        losses.torque_without_position, losses.position_without_torque
+    );
+    vec![
+        ("external torques", told(&recording.torques)),
+        ("unpaired", unpaired),
+    ]
 }
 
 fn told(topic: &TopicReport) -> String {

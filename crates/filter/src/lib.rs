@@ -19,6 +19,7 @@ mod settings;
 mod skin;
 mod step;
 mod tare;
+mod torque_settings;
 
 pub use detection::{ContactChange, ContactEvent, Detection};
 pub use detector::{Detector, DetectorParameters, JointBias};
@@ -37,3 +38,7 @@ pub use scene::{
 };
 pub use settings::{InputSettings, RobotSettings, Settings, SettingsError, VizSettings};
 pub use tare::{TareRefusal, TareState};
+pub use torque_settings::{
+    FrictionSettings, ObserverSettings, PayloadSettings, SpeedSource, TorqueSettings, TorqueSource,
+    VelocitySettings,
+};

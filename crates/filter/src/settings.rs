@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_yaml_ng::{Mapping, Value};
 
 use crate::tare::TARE_SECS;
-use crate::{PARAMETER_TABLE, ParameterError, Parameters};
+use crate::{PARAMETER_TABLE, ParameterError, Parameters, TorqueSettings};
 
 /// All parameters of the node and of `palpate replay`; the one place of their defaults, with [`Parameters`]. Unknown
 /// keys are refused.
@@ -24,6 +24,8 @@ pub struct Settings {
     pub robot: RobotSettings,
     /// How samples come in.
     pub input: InputSettings,
+    /// Where the external torque comes from.
+    pub torque: TorqueSettings,
     /// The filter.
     pub filter: Parameters,
     /// What is drawn, and how often.
@@ -38,6 +40,7 @@ impl Default for Settings {
             seed: 1,
             robot: RobotSettings::default(),
             input: InputSettings::default(),
+            torque: TorqueSettings::default(),
             filter: Parameters::default(),
             viz: VizSettings::default(),
         }
@@ -302,6 +305,7 @@ impl Settings {
 
     fn check(&self) -> Result<(), ParameterError> {
         self.filter.check()?;
+        self.torque.check()?;
         let tolerance = self.input.pairing_tolerance_secs;
         in_range(
             "input.pairing_tolerance_secs",

@@ -234,12 +234,12 @@ fn the_ends_of_a_range_are_within_it() {
     }
 }
 
-/// Settings with one parameter changed; a pair gets twice the same value.
+/// Settings with one parameter changed; every entry of a list gets the same value.
 fn with(name: &str, value: f64) -> Result<Settings, SettingsError> {
     let mut flat = Settings::default().to_flat();
     let entry = flat.iter_mut().find(|entry| entry.0 == name).unwrap();
     entry.1 = match &entry.1 {
-        Value::Sequence(_) => vec![Value::from(value); 2].into(),
+        Value::Sequence(values) => vec![Value::from(value); values.len()].into(),
         Value::Number(number) if number.is_i64() || number.is_u64() => (value as i64).into(),
         _ => value.into(),
     };

@@ -28,7 +28,12 @@ fn type_of(value: &Value) -> &'static str {
         Value::Number(number) if number.is_f64() => "float",
         Value::Number(_) => "integer",
         Value::String(_) => "string",
-        Value::Sequence(values) if values.first().is_some_and(Value::is_f64) => "two floats",
+        Value::Sequence(values) if values.first().is_some_and(Value::is_f64) => {
+            match values.len() {
+                2 => "two floats",
+                _ => "floats",
+            }
+        }
         Value::Sequence(_) => "strings",
         other => panic!("no parameter is {other:?}"),
     }

@@ -2,6 +2,7 @@
 
 mod choice;
 mod damage;
+mod measured;
 mod round_trip;
 mod sources;
 mod storage;

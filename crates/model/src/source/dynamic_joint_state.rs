@@ -27,5 +27,6 @@ pub(super) fn read<F: Fields>(message: F) -> Option<JointReading> {
         controller_ns: None,
         position: values("position"),
         effort: values("external_torque"),
+        ..JointReading::default()
     })
 }

@@ -13,5 +13,6 @@ pub(super) fn read<F: Fields>(message: F) -> Option<JointReading> {
         controller_ns: None,
         position: values("measured_joint_state", "position")?,
         effort: values("tau_ext_hat_filtered", "effort")?,
+        ..JointReading::default()
     })
 }

@@ -13,5 +13,6 @@ pub(super) fn read<F: Fields>(message: F) -> Option<JointReading> {
         ),
         position: values("measured_joint_position")?,
         effort: values("external_torque")?,
+        ..JointReading::default()
     })
 }

@@ -1,6 +1,6 @@
 //! What one message tells of the joints, and the robot's joints picked out of it.
 
-use crate::{JointMap, ModelError, Robot};
+use crate::{JointMap, MeasuredSample, ModelError, Robot};
 
 /// What one message tells of the joints.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -12,6 +12,8 @@ pub struct JointReading {
     pub controller_ns: Option<i64>,
     /// Positions, rad or m; empty if the message has none.
     pub position: JointValues,
+    /// Speeds, rad/s or m/s; empty if the message has none.
+    pub velocity: JointValues,
     /// Efforts, Nm or N; empty if the message has none. External torques, but for a `JointState`, whose topic decides.
     pub effort: JointValues,
 }
@@ -38,6 +40,34 @@ impl JointValues {
             names: None,
             values,
         }
+    }
+}
+
+impl JointReading {
+    /// The message as a measured sample of the robot's joints: its efforts are what the joints drive with. Speeds may be
+    /// absent.
+    ///
+    /// # Errors
+    /// As [`JointPicker::pick`]; with the quantity that is wrong.
+    pub fn measured(
+        &self,
+        robot: &Robot,
+        picker: &mut JointPicker,
+        stamp_ns: i64,
+    ) -> Result<MeasuredSample, (&'static str, ModelError)> {
+        let mut pick = |what, joints: &JointValues| {
+            let picked = picker.pick(robot, joints);
+            picked.map_err(|error| (what, error))
+        };
+        Ok(MeasuredSample {
+            stamp_ns,
+            position: pick("position", &self.position)?,
+            velocity: match self.velocity.values.is_empty() {
+                true => Vec::new(),
+                false => pick("velocity", &self.velocity)?,
+            },
+            torque: pick("effort", &self.effort)?,
+        })
     }
 }
 
