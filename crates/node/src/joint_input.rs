@@ -402,9 +402,9 @@ mod tests {
         let joints = JointValues::named(names, values.to_vec());
         JointReading {
             stamp_ns: Some(stamp_ns),
-            controller_ns: None,
             position: joints.clone(),
             effort: joints,
+            ..JointReading::default()
         }
     }
 
