@@ -140,7 +140,8 @@ fn losses(observed: &Observed<'_>, progress: &Progress) -> Losses {
     let refused = messages.joints_missing
         + messages.wrong_length
         + messages.stamp_not_after
-        + messages.unreadable;
+        + messages.unreadable
+        + messages.unmeasured;
     Losses {
         positions: messages.positions,
         torques: messages.torques,
@@ -166,6 +167,11 @@ fn counts(observed: &Observed<'_>, progress: &Progress, losses: &Losses) -> Vec<
         ("refused, joint missing", messages.joints_missing),
         ("refused, wrong length", wrong_length),
         ("refused, unreadable", messages.unreadable),
+        ("refused, not measured", messages.unmeasured),
+        (
+            "torques beyond their limit",
+            observed.input.beyond_limit().0,
+        ),
         ("refused, not finite", intake.not_finite),
         ("refused, too large", intake.too_large),
         ("refused, stamp not after", stamp_not_after),

@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use palpate_filter::InputSettings;
 use palpate_model::{
-    JointPicker, JointReading, JointSample, JointValues, ModelError, Pairing, PairingLosses, Robot,
-    Source,
+    BeyondLimit, ExternalTorque, JointPicker, JointReading, JointSample, JointValues, ModelError,
+    Pairing, PairingLosses, Robot, Source, TorqueRefusal,
 };
+
+use crate::measured_input::MeasuredInput;
 
 /// Why a message was refused.
 #[derive(Debug, thiserror::Error)]
@@ -37,6 +39,14 @@ pub enum MessageError {
         /// The topic.
         topic: &'static str,
     },
+    /// A measured torque, or what is needed to tell the external one from it, is missing or wrong.
+    #[error("{topic}: {source}")]
+    Measured {
+        /// The topic.
+        topic: &'static str,
+        /// What is wrong.
+        source: TorqueRefusal,
+    },
     /// The stamp is not after the topic's last one.
     #[error("{topic}: expected a stamp after {last_ns} ns, found {found_ns} ns")]
     StampNotAfter {
@@ -64,6 +74,8 @@ pub struct MessageCounts {
     pub stamp_not_after: u64,
     /// Refused: not the fields of its type, or without any time to stamp it with.
     pub unreadable: u64,
+    /// Refused: a position, speed or measured torque is missing, or no number.
+    pub unmeasured: u64,
     /// Times that time started anew.
     pub time_jumps: u64,
 }
@@ -113,6 +125,8 @@ pub struct JointInput {
     position: Topic,
     torque: Topic,
     pairing: Pairing,
+    /// None where torques come in as external ones.
+    measured: Option<MeasuredInput>,
     latest_ns: Option<i64>,
     jump_ns: Option<i64>,
     counts: MessageCounts,
@@ -133,11 +147,19 @@ impl JointInput {
             torque: topic("external_torque"),
             robot,
             pairing: Pairing::new(nanoseconds(settings.pairing_tolerance_secs)),
+            measured: None,
             latest_ns: None,
             jump_ns: jump_ns(settings),
             counts: MessageCounts::default(),
             delays: Delays::default(),
         }
+    }
+
+    /// Takes positions, speeds and measured torques together on `joint_states`, and tells the external torque by
+    /// `external`. Nothing is expected on `external_torque` then.
+    pub fn with_measured_torques(mut self, external: ExternalTorque) -> Self {
+        self.measured = Some(MeasuredInput::new(external));
+        self
     }
 
     /// Takes over the times of `settings`.
@@ -158,6 +180,7 @@ impl JointInput {
         now_ns: Option<i64>,
     ) -> Result<(), MessageError> {
         self.counts.positions += 1;
+        self.counts.torques += u64::from(self.measured.is_some());
         let taken = self.take_position(reading, now_ns);
         self.count(taken)
     }
@@ -186,12 +209,34 @@ impl JointInput {
         self.delays.position_ns = delay(now_ns, reading.stamp_ns);
         let stamp_ns = self.position.stamp(reading, now_ns, self.jump_ns)?;
         self.watch_time(stamp_ns);
+        if self.measured.is_some() {
+            return self.take_measured(reading, stamp_ns);
+        }
         let position = self
             .position
             .pick(&self.robot, "position", &reading.position)?;
         self.position.advance(stamp_ns)?;
         self.pairing.push_position(stamp_ns, position);
         Ok(())
+    }
+
+    fn take_measured(&mut self, reading: &JointReading, stamp_ns: i64) -> Result<(), MessageError> {
+        let topic = self.position.name;
+        let sample = reading
+            .measured(&self.robot, &mut self.position.picker, stamp_ns)
+            .map_err(|(quantity, source)| MessageError::Joints {
+                topic,
+                quantity,
+                source,
+            })?;
+        self.position.advance(stamp_ns)?;
+        let taken = self
+            .measured
+            .as_mut()
+            .map(|measured| measured.take(&sample));
+        taken
+            .unwrap_or(Ok(()))
+            .map_err(|source| MessageError::Measured { topic, source })
     }
 
     fn take_torque(
@@ -222,7 +267,10 @@ impl JointInput {
 
     /// The next sample that is complete.
     pub fn next_sample(&mut self) -> Option<TimedSample> {
-        let sample = self.pairing.next_sample()?;
+        let sample = match &mut self.measured {
+            Some(measured) => measured.next_sample()?,
+            None => self.pairing.next_sample()?,
+        };
         Some(TimedSample {
             sample,
             epoch: self.counts.time_jumps,
@@ -239,6 +287,12 @@ impl JointInput {
         self.delays
     }
 
+    /// How many samples had a measured torque beyond its joint's limit, and the first of these torques.
+    pub fn beyond_limit(&self) -> (u64, Option<&BeyondLimit>) {
+        let measured = self.measured.as_ref();
+        measured.map_or((0, None), MeasuredInput::beyond_limit)
+    }
+
     /// What found no partner so far.
     pub fn pairing_losses(&self) -> PairingLosses {
         self.pairing.losses()
@@ -251,6 +305,9 @@ impl JointInput {
         if jumped {
             self.counts.time_jumps += 1;
             self.pairing.clear();
+            if let Some(measured) = &mut self.measured {
+                measured.restart();
+            }
             self.position.last_ns = None;
             self.torque.last_ns = None;
         }
@@ -267,6 +324,7 @@ impl JointInput {
                 _ => self.counts.wrong_length += 1,
             },
             Err(MessageError::StampNotAfter { .. }) => self.counts.stamp_not_after += 1,
+            Err(MessageError::Measured { .. }) => self.counts.unmeasured += 1,
             Err(MessageError::Fields { .. } | MessageError::NoTime { .. }) => {
                 self.counts.unreadable += 1;
             }
@@ -470,6 +528,7 @@ mod tests {
             wrong_length: 1,
             stamp_not_after: 1,
             unreadable: 2,
+            unmeasured: 0,
             time_jumps: 0,
         };
         assert_eq!(counts, expected);

@@ -3,6 +3,7 @@
 
 mod health;
 mod joint_input;
+mod measured_input;
 mod newest;
 mod parameter_names;
 mod throttle;

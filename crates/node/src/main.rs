@@ -47,7 +47,10 @@ fn main() -> ExitCode {
     };
     match topics::run(&mut node, robot, settings, &stop) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) if error.is::<palpate_filter::ParameterError>() => {
+        Err(error)
+            if error.is::<palpate_filter::ParameterError>()
+                || error.is::<palpate_model::ModelError>() =>
+        {
             report(&error, BAD_PARAMETERS)
         }
         Err(error) => report(&error, FAILURE),

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use futures::{FutureExt, Stream, StreamExt};
 use palpate_filter::{InputSettings, ParameterError};
-use palpate_model::{JointReading, Robot, Source};
+use palpate_model::{ExternalTorque, JointReading, Robot, Source};
 use palpate_node::{JointInput, MessageError, Newest, Throttle, TimedSample, Untyped, nanoseconds};
 use r2r::{QosProfile, WrappedNativeMsgUntyped};
 use serde_json::Value;
@@ -18,11 +18,13 @@ pub struct Reader {
     source: Source,
     /// None where the torques' messages hold positions too.
     positions: Option<Messages>,
-    torques: Messages,
+    /// None where torques are told from those measured beside the positions.
+    torques: Option<Messages>,
     pub input: JointInput,
     samples: Arc<Newest<TimedSample>>,
     max_wait_ns: i64,
     complaints: Throttle,
+    has_told_limit: bool,
 }
 
 type Messages = Box<dyn Stream<Item = r2r::Result<Value>> + Unpin>;
@@ -43,21 +45,29 @@ impl Reader {
         node: &mut r2r::Node,
         robot: Arc<Robot>,
         settings: &InputSettings,
+        external: Option<ExternalTorque>,
         samples: Arc<Newest<TimedSample>>,
     ) -> r2r::Result<Self> {
         let source = settings.source;
-        let positions = match source.has_both() {
+        let mut joint_states = || subscribe(node, "joint_states", Source::JointState);
+        let positions = match source.has_both() && external.is_none() {
             true => None,
-            false => Some(subscribe(node, "joint_states", Source::JointState)?),
+            false => Some(joint_states()?),
+        };
+        let input = JointInput::new(robot, settings);
+        let (torques, input) = match external {
+            None => (Some(subscribe(node, "external_torque", source)?), input),
+            Some(external) => (None, input.with_measured_torques(external)),
         };
         Ok(Self {
             source,
             positions,
-            torques: subscribe(node, "external_torque", source)?,
-            input: JointInput::new(robot, settings),
+            torques,
+            input,
             samples,
             max_wait_ns: nanoseconds(settings.max_wait_secs),
             complaints: Throttle::new(Duration::from_secs(5)),
+            has_told_limit: false,
         })
     }
 
@@ -74,7 +84,7 @@ impl Reader {
             let taken = self.input.position(reading.as_ref(), now_ns);
             self.hand_on(taken);
         }
-        while let Some(message) = next(&mut self.torques) {
+        while let Some(message) = self.torques.as_mut().and_then(next) {
             let reading = read(self.source, message);
             let taken = self.input.torque(reading.as_ref(), now_ns);
             self.hand_on(taken);
@@ -86,6 +96,12 @@ impl Reader {
             && let Some(more) = self.complaints.pass(Instant::now())
         {
             tracing::warn!("message refused (and {more} before): {refusal}");
+        }
+        if let (_, Some(beyond)) = self.input.beyond_limit()
+            && !self.has_told_limit
+        {
+            tracing::warn!("{beyond} Further ones are only counted.");
+            self.has_told_limit = true;
         }
         while let Some(sample) = self.input.next_sample() {
             let max_wait_ns = self.max_wait_ns;

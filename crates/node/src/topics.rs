@@ -126,6 +126,7 @@ impl AtWork {
         Publishers { outputs, pictures }: Publishers,
     ) -> anyhow::Result<Self> {
         let robot = Arc::new(robot);
+        let external = settings.torque.external_torque(&robot)?;
         let filter = Filter::new(&robot, &settings.filter, settings.seed)?;
         let samples = Arc::new(Newest::new(MOST_WAITING));
         let easel = Arc::new(Easel::new(settings.viz.rate));
@@ -134,6 +135,7 @@ impl AtWork {
             node,
             Arc::clone(&robot),
             &settings.input,
+            external,
             Arc::clone(&samples),
         )?;
         let estimation = Estimation::new(
