@@ -11,6 +11,8 @@ use palpate_model::{
     LoadOptions, MeasuredSample, Payload, Robot, TorqueMethod, VelocitySource, iiwa14,
 };
 use palpate_sim::{Drive, DriveMoment, DriveScenario, Push};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
 
 /// Gain of the observer in these tests and by default, 1/s: a bandwidth of 25/2π = 4 Hz.
 const GAIN: f64 = 25.0;
@@ -409,6 +411,65 @@ fn a_torque_beyond_its_limit_is_told_and_used() {
         said.contains("lbr_A2") && said.contains(&limit.to_string()),
         "{said}"
     );
+}
+
+/// Whatever a driver sends: what is made of it is finite, and the observer comes back.
+#[test]
+fn garbage_leaves_the_observer_finite_and_passes() {
+    let robot = robot();
+    let mut random = StdRng::seed_from_u64(21);
+    for velocity in [
+        VelocitySource::Driver,
+        VelocitySource::Differentiated { cutoff_hz: 20.0 },
+    ] {
+        let options = ExternalTorqueOptions {
+            velocity,
+            ..observer(GAIN)
+        };
+        let mut external = ExternalTorque::new(&robot, &options).unwrap();
+        let wild = [
+            0.0,
+            1e-300,
+            3.0,
+            -1e9,
+            1e9,
+            1e200,
+            f64::NAN,
+            f64::NEG_INFINITY,
+        ];
+        let mut used = 0;
+        for index in 0..5000 {
+            let mut garbage = sample(index);
+            for values in [
+                &mut garbage.position,
+                &mut garbage.velocity,
+                &mut garbage.torque,
+            ] {
+                let joint = random.random_range(0..7);
+                values[joint] = wild[random.random_range(0..wild.len())];
+            }
+            if let Ok(found) = external.update(&garbage) {
+                used += 1;
+                assert!(
+                    found
+                        .external_torque
+                        .iter()
+                        .all(|torque| torque.is_finite())
+                );
+            }
+        }
+        assert!((500..4500).contains(&used), "{used}");
+        let mut clean = ExternalTorque::new(&robot, &options).unwrap();
+        for step in 1..10_000 {
+            let good = sample(step * 1_000_000);
+            let found = external.update(&good).unwrap().external_torque.clone();
+            let expected = &clean.update(&good).unwrap().external_torque;
+            if step == 9_999 {
+                let worst = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
+                assert!(worst.fold(0.0, f64::max) < 1e-3);
+            }
+        }
+    }
 }
 
 #[test]

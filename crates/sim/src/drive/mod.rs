@@ -26,6 +26,11 @@ use crate::SimError;
 /// The moments of a [`DriveScenario`], one after the other; ends after its duration. The same scenario and robot give
 /// the same bits.
 ///
+/// Feed [`DriveMoment::measured`] to a [`palpate_model::ExternalTorque`], and compare what it makes of it with
+/// [`DriveMoment::external_torque`]; [`DriveMoment::push`] tells when something touches, and which link. Moments are made
+/// one at a time, so that an hour at 1 kHz needs no memory. Noise, drift, friction, and masses that differ from what the
+/// estimator believes are fields of the scenario.
+///
 /// A motion without contact, and one that is pushed with 10 N on link 5 from 1.0 s to 1.5 s:
 ///
 /// ```
