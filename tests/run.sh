@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Runs every test: those of Rust, then those against a real ROS 2. Needs Rust, python3 with venv and a C compiler.
-# A ROS 2 that is sourced is used; else one is installed into .ros2/ (see tests/ros2_env.sh). Arguments go to pytest.
+# Runs every test: those of Rust, then those against a real ROS 2. Needs Rust, python3 with venv, a C and a C++
+# compiler. A ROS 2 that is sourced is used; else one is installed into .ros2/ (see tests/ros2_env.sh). Arguments go
+# to pytest.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

@@ -519,6 +519,35 @@ mod tests {
     }
 
     #[test]
+    fn every_shipped_file_parses_and_a_driver_s_says_its_source_and_where_to_find_the_rest() {
+        let config = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config"));
+        let mut drivers = 0;
+        for entry in std::fs::read_dir(config).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_none_or(|extension| extension != "yaml") {
+                continue;
+            }
+            let mut settings = Settings::read(&path).unwrap();
+            let text = std::fs::read_to_string(&path).unwrap();
+            if path.ends_with("palpate.yaml") {
+                continue;
+            }
+            drivers += 1;
+            assert!(
+                text.contains("config/palpate.yaml has every parameter"),
+                "{path:?}"
+            );
+            assert!(text.contains("# Topics: external_torque:=/"), "{path:?}");
+            assert!(text.contains("      source: "), "{path:?}");
+            // What differs from the defaults is how messages come in.
+            settings.input.source = Source::default();
+            settings.input.joint_names.clear();
+            assert_eq!(settings, Settings::default(), "{path:?}");
+        }
+        assert_eq!(drivers, 4);
+    }
+
+    #[test]
     fn the_shipped_file_has_every_parameter() {
         let file: Value =
             serde_yaml_ng::from_str(include_str!("../../../config/palpate.yaml")).unwrap();

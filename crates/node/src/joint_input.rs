@@ -127,7 +127,6 @@ pub struct JointInput {
     pairing: Pairing,
     /// None where torques come in as external ones.
     measured: Option<MeasuredInput>,
-    latest_ns: Option<i64>,
     jump_ns: Option<i64>,
     counts: MessageCounts,
     delays: Delays,
@@ -148,7 +147,6 @@ impl JointInput {
             robot,
             pairing: Pairing::new(nanoseconds(settings.pairing_tolerance_secs)),
             measured: None,
-            latest_ns: None,
             jump_ns: jump_ns(settings),
             counts: MessageCounts::default(),
             delays: Delays::default(),
@@ -208,7 +206,7 @@ impl JointInput {
         let reading = self.position.read(reading, Source::JointState)?;
         self.delays.position_ns = delay(now_ns, reading.stamp_ns);
         let stamp_ns = self.position.stamp(reading, now_ns, self.jump_ns)?;
-        self.watch_time(stamp_ns);
+        self.watch_time(self.position.last_ns, stamp_ns);
         if self.measured.is_some() {
             return self.take_measured(reading, stamp_ns);
         }
@@ -248,7 +246,7 @@ impl JointInput {
         self.delays.torque_ns = delay(now_ns, reading.stamp_ns);
         self.delays.controller_ns = delay(now_ns, reading.controller_ns);
         let stamp_ns = self.torque.stamp(reading, now_ns, self.jump_ns)?;
-        self.watch_time(stamp_ns);
+        self.watch_time(self.torque.last_ns, stamp_ns);
         let torque = self.torque.pick(&self.robot, "torque", &reading.effort)?;
         let position = match self.source.has_both() {
             true => Some(
@@ -298,10 +296,11 @@ impl JointInput {
         self.pairing.losses()
     }
 
-    /// Starts anew where time does, as when a bag is played again.
-    fn watch_time(&mut self, stamp_ns: i64) {
-        let jumped = (self.latest_ns.zip(self.jump_ns))
-            .is_some_and(|(latest_ns, jump_ns)| stamp_ns < latest_ns.saturating_sub(jump_ns));
+    /// Starts anew where a topic's time does, as when a bag is played again. That the two topics' clocks differ is no such
+    /// jump.
+    fn watch_time(&mut self, last_ns: Option<i64>, stamp_ns: i64) {
+        let jumped = (last_ns.zip(self.jump_ns))
+            .is_some_and(|(last_ns, jump_ns)| stamp_ns < last_ns.saturating_sub(jump_ns));
         if jumped {
             self.counts.time_jumps += 1;
             self.pairing.clear();
@@ -310,9 +309,6 @@ impl JointInput {
             }
             self.position.last_ns = None;
             self.torque.last_ns = None;
-        }
-        if jumped || self.latest_ns.is_none_or(|latest_ns| stamp_ns > latest_ns) {
-            self.latest_ns = Some(stamp_ns);
         }
     }
 
@@ -610,6 +606,19 @@ mod tests {
             controller_ns: None,
         };
         assert_eq!(input.delays(), expected);
+    }
+
+    #[test]
+    fn clocks_that_differ_are_no_jump() {
+        let mut input = input();
+        for step in 0..3 {
+            let at = |stamp_ns| reading(stamp_ns, &["a", "b"], &[1.0, 2.0]);
+            input.position(Some(&at(90_000 * MS + step)), None).unwrap();
+            input.torque(Some(&at(step)), None).unwrap();
+        }
+        assert!(samples(&mut input).is_empty());
+        assert_eq!(input.counts().time_jumps, 0);
+        assert_eq!(input.pairing_losses().torque_without_position, 3);
     }
 
     #[test]
