@@ -10,7 +10,7 @@ use r2r::QosProfile;
 use r2r::builtin_interfaces::msg::Time;
 use r2r::rosgraph_msgs::msg::Clock as ClockMessage;
 
-use crate::messages;
+use palpate_node::messages;
 
 /// The machine's clock, or `/clock` where the parameter `use_sim_time` is set.
 pub struct Clock {

@@ -11,7 +11,7 @@ use r2r::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use r2r::{Publisher, QosProfile};
 
 use crate::estimation::Progress;
-use crate::messages;
+use palpate_node::messages;
 
 const PERIOD: Duration = Duration::from_secs(1);
 

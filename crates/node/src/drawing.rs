@@ -10,7 +10,7 @@ use r2r::Publisher;
 use r2r::sensor_msgs::msg::PointCloud2;
 use r2r::visualization_msgs::msg::MarkerArray;
 
-use crate::messages;
+use palpate_node::messages;
 
 /// Everything that a picture needs.
 pub struct Drawing {

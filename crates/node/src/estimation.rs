@@ -13,8 +13,8 @@ use r2r::sensor_msgs::msg::JointState;
 use r2r::std_msgs::msg::Bool;
 
 use crate::drawing::{Drawing, Easel};
-use crate::messages;
 use crate::order::{Asked, Order, Outcome};
+use palpate_node::messages;
 
 /// How long to wait for a sample before looking for orders.
 const PATIENCE: Duration = Duration::from_millis(20);

@@ -1,11 +1,15 @@
-//! Topics: what the ROS 2 node is made of that needs no ROS. The node itself is the binary `palpate_node`, behind the
-//! feature `ros2`.
+//! Topics: what the ROS 2 node is made of that needs no ROS. The node itself is the binary `palpate_node`; it and
+//! `palpate_simulated_driver`, the modules `messages` and `process` are behind the feature `ros2`.
 
 mod health;
 mod joint_input;
 mod measured_input;
+#[cfg(feature = "ros2")]
+pub mod messages;
 mod newest;
 mod parameter_names;
+#[cfg(feature = "ros2")]
+pub mod process;
 mod throttle;
 mod untyped;
 

@@ -145,7 +145,8 @@ fn label_marker(label: &Label, header: &Header) -> Marker {
     marker
 }
 
-fn marker(header: &Header) -> Marker {
+/// A marker to be added, opaque and at the header's frame, whatever it is to show.
+pub fn marker(header: &Header) -> Marker {
     let mut marker = Marker {
         header: header.clone(),
         action: Marker::ADD as i32,
@@ -156,7 +157,8 @@ fn marker(header: &Header) -> Marker {
     marker
 }
 
-fn point(point: &Point3<f64>) -> Point {
+/// A point, m.
+pub fn point(point: &Point3<f64>) -> Point {
     Point {
         x: point.x,
         y: point.y,
@@ -164,10 +166,12 @@ fn point(point: &Point3<f64>) -> Point {
     }
 }
 
-fn scale(x: f64, y: f64, z: f64) -> Vector3 {
+/// A size or a vector.
+pub fn scale(x: f64, y: f64, z: f64) -> Vector3 {
     Vector3 { x, y, z }
 }
 
-fn colour([r, g, b, a]: Colour) -> ColorRGBA {
+/// A colour.
+pub fn colour([r, g, b, a]: Colour) -> ColorRGBA {
     ColorRGBA { r, g, b, a }
 }

@@ -2,7 +2,6 @@
 
 use std::sync::PoisonError;
 
-use anyhow::Context as _;
 use palpate_filter::{Settings, SettingsError};
 use r2r::ParameterValue;
 use r2r::rcl_interfaces::msg::ParameterValue as ParameterMessage;
@@ -22,20 +21,6 @@ pub mod kind {
     pub const INTEGER_ARRAY: u8 = ParameterType::PARAMETER_INTEGER_ARRAY as u8;
     pub const DOUBLE_ARRAY: u8 = ParameterType::PARAMETER_DOUBLE_ARRAY as u8;
     pub const STRING_ARRAY: u8 = ParameterType::PARAMETER_STRING_ARRAY as u8;
-}
-
-/// Looks at the parameter files among the arguments, as ROS 2 itself ends the process over one that is missing.
-pub fn check_files(arguments: impl Iterator<Item = String>) -> anyhow::Result<()> {
-    let arguments: Vec<_> = arguments.collect();
-    for pair in arguments.windows(2) {
-        if let [option, file] = pair
-            && option == "--params-file"
-        {
-            std::fs::read(file)
-                .with_context(|| format!("cannot read the parameter file {file}"))?;
-        }
-    }
-    Ok(())
 }
 
 /// Reads what the node was given.

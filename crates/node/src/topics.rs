@@ -21,7 +21,7 @@ use crate::order::{Asked, Order};
 use crate::parameter_services::ParameterServices;
 use crate::reader::Reader;
 use crate::services::Services;
-use crate::stopped;
+use palpate_node::process::stopped;
 
 /// Samples that wait for the filter at most, however young they are.
 const MOST_WAITING: usize = 10_000;
