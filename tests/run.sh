@@ -22,7 +22,8 @@ if [ "$(cat "$tools/stamp" 2>/dev/null)" != "$wanted" ]; then
     rm -rf "$tools"
     "${PYTHON:-python3}" -m venv --system-site-packages "$tools"
     "$tools/bin/python" -m pip install --quiet --disable-pip-version-check --no-input \
-        --constraint tests/ros2-constraints.txt pytest rosbags
+        --constraint tests/ros2-constraints.txt pytest rosbags \
+        colcon-core colcon-cmake colcon-ros colcon-bash colcon-recursive-crawl cmake ninja
     printf '%s' "$wanted" >"$tools/stamp"
 fi
 
@@ -31,6 +32,8 @@ step "the node"
 cargo build --workspace --features palpate-node/ros2
 target=$(cargo metadata --no-deps --format-version 1 | "$tools/bin/python" -c \
     'import json, sys; print(json.load(sys.stdin)["target_directory"])')
+# colcon and what it calls.
+export PATH=$tools/bin:$PATH
 export PALPATE_NODE=$target/debug/palpate_node PALPATE=$target/debug/palpate
 export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 

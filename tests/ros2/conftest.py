@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from support import PARTICLES, URDF, PalpateNode, Peer, new_domain, palpate
+from support import NODE, PARTICLES, URDF, PalpateNode, Peer, new_domain, palpate
 
 
 @pytest.fixture
@@ -23,9 +23,9 @@ def start(domain, tmp_path):
     """Starts nodes; those that still run at the end must end with exit code 0."""
     nodes = []
 
-    def start_node(*arguments, **parameters):
+    def start_node(*arguments, program=NODE, environment=None, **parameters):
         log = tmp_path / f"node_{len(nodes)}.log"
-        node = PalpateNode(domain, log, *arguments, parameters=parameters)
+        node = PalpateNode(domain, log, *arguments, parameters=parameters, program=program, environment=environment)
         nodes.append(node)
         return node
 

@@ -33,14 +33,14 @@ def new_domain():
 
 
 class PalpateNode:
-    """The node as a process. Its log is kept, for the tests to read."""
+    """The node, or another program, as a process. Its log is kept, for the tests to read."""
 
-    def __init__(self, domain, log, *arguments, parameters=None):
-        command = [NODE, *arguments, "--ros-args"]
+    def __init__(self, domain, log, *arguments, parameters=None, program=NODE, environment=None):
+        command = [program, *arguments, "--ros-args"]
         for name, value in (parameters or {}).items():
             command += ["-p", f"{name}:={value}"]
         self.log_path = log
-        environment = dict(os.environ, ROS_DOMAIN_ID=str(domain), NO_COLOR="1")
+        environment = dict(environment or os.environ, ROS_DOMAIN_ID=str(domain), NO_COLOR="1")
         with open(log, "w") as stderr:
             self.process = subprocess.Popen(command, stderr=stderr, env=environment)
 
