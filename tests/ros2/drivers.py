@@ -30,6 +30,8 @@ class Driver:
     is_stamped: bool = True
     # Where it is not the preset's.
     source: str | None = None
+    # What the arm's URDF has besides.
+    extra_urdf: str = ""
 
 
 def stamped(message, stamp_ns, frame=""):
@@ -83,6 +85,18 @@ def franka_state(driver, sample):
 
 LBR_JOINTS = [f"lbr_A{number}" for number in range(1, 8)]
 FRANKA_JOINTS = [f"fr3_joint{number}" for number in range(1, 8)]
+# Of whose joints neither message tells.
+FRANKA_HAND = """
+  <link name="fr3_leftfinger"/>
+  <link name="fr3_rightfinger"/>
+  <joint name="fr3_finger_joint1" type="prismatic">
+    <parent link="lbr_link_ee"/><child link="fr3_leftfinger"/><limit lower="0" upper="0.04" effort="100" velocity="0.2"/>
+  </joint>
+  <joint name="fr3_finger_joint2" type="prismatic">
+    <parent link="lbr_link_ee"/><child link="fr3_rightfinger"/><limit lower="0" upper="0.04" effort="100" velocity="0.2"/>
+    <mimic joint="fr3_finger_joint1"/>
+  </joint>
+"""
 
 DRIVERS = {
     "lbr_state": Driver(
@@ -130,6 +144,7 @@ DRIVERS = {
         messages=lambda driver, sample: {
             "/franka_robot_state_broadcaster/robot_state": franka_state(driver, sample)
         },
+        extra_urdf=FRANKA_HAND,
     ),
     "franka_torques": Driver(
         preset="franka_ros2",
@@ -140,6 +155,7 @@ DRIVERS = {
             "/joint_states": joint_state(driver, sample),
             "/franka_robot_state_broadcaster/external_joint_torques": torque_joint_state(driver, sample),
         },
+        extra_urdf=FRANKA_HAND,
         source="joint_state",
     ),
 }

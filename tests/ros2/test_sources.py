@@ -61,7 +61,7 @@ def write_urdf(path, driver):
     text = URDF.read_text().replace("package://palpate", ROOT.as_uri())
     for number, joint in enumerate(driver.joints, 1):
         text = text.replace(f'"lbr_A{number}"', f'"{joint}"')
-    path.write_text(text)
+    path.write_text(text.replace("</robot>", f"{driver.extra_urdf}</robot>"))
 
 
 def definition(type_name):

@@ -23,6 +23,9 @@ pub struct Inspect {
     /// Split triangles until no edge is longer, m
     #[arg(long, value_name = "M", default_value_t = LoadOptions::default().max_edge)]
     max_edge: f64,
+    /// Hold this joint at zero, as a gripper's finger; can be given several times
+    #[arg(long = "fixed-joint", value_name = "JOINT")]
+    fixed_joints: Vec<String>,
 }
 
 impl Inspect {
@@ -35,6 +38,7 @@ impl Inspect {
                 Geometry::Collision
             },
             max_edge: self.max_edge,
+            fixed_joints: self.fixed_joints.clone(),
         };
         let (robot, report) = self.robot.load(&RobotSettings::default(), &options)?;
         table::print(&joints(&robot))?;

@@ -46,6 +46,7 @@ pub const PARAMETER_TABLE: &[ParameterRow] = &[
     row("robot.package_dirs", "", "", None, false, "folders for `package://`, before those of the ament prefix path"),
     row("robot.geometry", "", "`collision`, `visual`", None, false, "which geometry can be touched"),
     row("robot.max_edge", "m", "≥ 0.001", Some([0.001, f64::MAX]), false, "coarse triangles are split until no edge is longer"),
+    row("robot.fixed_joints", "", "", None, false, "joints held at zero because no message tells of them, as a gripper's fingers"),
     row("input.source", "", "`joint_state`, `multi_array`, `lbr_state`, `franka_state`, `dynamic_joint_state`", None, false, "messages that external torques come in"),
     row("input.joint_names", "", "", None, false, "joints of messages without names; none: the robot's, in its order"),
     row("input.pairing_tolerance_secs", "s", "0 to 10", Some([0.0, 10.0]), true, "most that stamps of position and torque may differ"),

@@ -60,16 +60,24 @@ pub struct RobotSettings {
     pub geometry: Geometry,
     /// Coarse triangles are split until no edge is longer, m. Default 0.02.
     pub max_edge: f64,
+    /// Joints that are held at zero because no message tells of them, as a gripper's fingers. Empty names are skipped,
+    /// and so are those that the robot has not. Default none.
+    pub fixed_joints: Vec<String>,
 }
 
 impl Default for RobotSettings {
     fn default() -> Self {
-        let LoadOptions { geometry, max_edge } = LoadOptions::default();
+        let LoadOptions {
+            geometry,
+            max_edge,
+            fixed_joints,
+        } = LoadOptions::default();
         Self {
             description_file: String::new(),
             package_dirs: Vec::new(),
             geometry,
             max_edge,
+            fixed_joints,
         }
     }
 }
@@ -80,6 +88,7 @@ impl RobotSettings {
         LoadOptions {
             geometry: self.geometry,
             max_edge: self.max_edge,
+            fixed_joints: self.fixed_joints.clone(),
         }
     }
 
@@ -514,6 +523,8 @@ mod tests {
         assert_eq!(shipped.robot.package_folders(), [] as [PathBuf; 0]);
         shipped.robot.package_dirs.clear();
         assert_eq!(shipped.input.unnamed_joints(), [] as [String; 0]);
+        assert_eq!(shipped.robot.fixed_joints, [""]);
+        shipped.robot.fixed_joints.clear();
         shipped.input.joint_names.clear();
         assert_eq!(shipped, Settings::default());
     }
@@ -539,7 +550,8 @@ mod tests {
             );
             assert!(text.contains("# Topics: external_torque:=/"), "{path:?}");
             assert!(text.contains("      source: "), "{path:?}");
-            // What differs from the defaults is how messages come in.
+            // What differs from the defaults is what messages tell, and how.
+            settings.robot.fixed_joints.clear();
             settings.input.source = Source::default();
             settings.input.joint_names.clear();
             assert_eq!(settings, Settings::default(), "{path:?}");

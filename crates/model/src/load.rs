@@ -16,13 +16,16 @@ pub enum Geometry {
 }
 
 /// How a robot is loaded.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LoadOptions {
     /// Which of a link's geometries can be touched.
     pub geometry: Geometry,
     /// Longest edge that a triangle may have, m; longer ones are split. Infinity keeps the triangles as they are.
     pub max_edge: f64,
+    /// Joints that are held at zero, whatever their type: those that no message tells of, as a gripper's fingers. Names
+    /// that the robot has not are no error, as grippers are options.
+    pub fixed_joints: Vec<String>,
 }
 
 impl Default for LoadOptions {
@@ -30,6 +33,7 @@ impl Default for LoadOptions {
         Self {
             geometry: Geometry::default(),
             max_edge: 0.02,
+            fixed_joints: Vec::new(),
         }
     }
 }

@@ -14,8 +14,8 @@ const MOST_NESTING: usize = 64;
 impl Robot {
     /// Builds a robot from the text of a URDF and the meshes that it names.
     ///
-    /// Revolute, continuous, prismatic and fixed joints are supported. A joint that mimics another one is refused, as
-    /// its torque is not its own.
+    /// Revolute, continuous, prismatic and fixed joints are supported, and any that is held fixed. A joint that mimics
+    /// another one is refused otherwise, as its torque is not its own.
     ///
     /// # Errors
     /// If the URDF is malformed, its links form no tree, a joint has another type, a number is not finite, or a mesh is
@@ -41,7 +41,7 @@ impl Robot {
             let elements = elements(link, options.geometry);
             let (mesh, link_report) = link_mesh::build(&link.name, &elements, meshes, options)?;
             report.links.push(link_report);
-            robot.push_link(link, joint_above)?;
+            robot.push_link(link, joint_above, options)?;
             if let Some(link) = robot.links.last_mut() {
                 link.mesh = mesh;
             }
@@ -76,6 +76,7 @@ impl Robot {
         &mut self,
         link: &urdf_rs::Link,
         joint_above: Option<&urdf_rs::Joint>,
+        options: &LoadOptions,
     ) -> Result<(), ModelError> {
         let mut new = Link {
             name: link.name.clone(),
@@ -92,7 +93,12 @@ impl Robot {
             if let Some(parent) = new.parent {
                 new.path.clone_from(&self.links[parent].path);
             }
-            if let Some(joint) = movable_joint(above)? {
+            let is_held = options.fixed_joints.contains(&above.name);
+            let joint = match is_held {
+                true => None,
+                false => movable_joint(above)?,
+            };
+            if let Some(joint) = joint {
                 new.joint = Some(self.joints.len());
                 new.path.push(self.joints.len());
                 self.joints.push(joint);

@@ -152,6 +152,7 @@ fn links_without_the_geometry_asked_for_cannot_be_touched() {
         let options = LoadOptions {
             geometry,
             max_edge: 0.05,
+            ..LoadOptions::default()
         };
         let (robot, _) = Robot::from_urdf(TREE, &MESHES, &options).unwrap();
         let links = robot.links.into_iter().filter(|link| link.mesh.is_some());
@@ -258,6 +259,31 @@ fn faults_in_the_tree_are_named() {
         ),
     ] {
         assert!(message.contains(told), "expected {told}\nfound {message}");
+    }
+}
+
+#[test]
+fn joints_that_are_held_stay_where_zero_is_whatever_their_type() {
+    let options = LoadOptions {
+        fixed_joints: ["grip", "turn", "absent", ""].map(str::to_owned).to_vec(),
+        ..LoadOptions::default()
+    };
+    let mimic = r#"<limit velocity="3" effort="4"/><mimic joint="grip"/>"#;
+    for xml in [
+        TREE.to_owned(),
+        TREE.replace("continuous", "floating"),
+        TREE.replace(r#"<limit velocity="3" effort="4"/>"#, mimic),
+    ] {
+        let (held, _) = Robot::from_urdf(&xml, &MESHES, &options).unwrap();
+        let names: Vec<_> = held.joints.iter().map(|joint| &joint.name).collect();
+        assert_eq!(names, ["reach"]);
+        let (free, _) = load(TREE).unwrap();
+        assert_eq!(held.links.len(), free.links.len());
+        for link in &free.links {
+            let found = &held.links[held.link_index(&link.name).unwrap()];
+            assert_eq!(found.parent_from_rest, link.parent_from_rest);
+            assert_eq!(found.mesh, link.mesh);
+        }
     }
 }
 
