@@ -94,7 +94,10 @@ impl Filter {
         let nothing = || ParameterError::NothingToTouch {
             robot: robot.name.clone(),
         };
-        let skin = Skin::new(robot).ok_or_else(nothing)?;
+        let mut skin = Skin::new(robot).ok_or_else(nothing)?;
+        if parameters.method == Method::Palpate {
+            skin = skin.with_bodies(robot);
+        }
         check_paths(robot)?;
         let count = parameters.particles;
         Ok(Self {

@@ -1,10 +1,12 @@
 //! What can be touched: the surfaces of all links whose contacts the joints can feel.
 
-use palpate_model::{Robot, Surface, SurfacePoint};
+use palpate_model::{Robot, SmoothBody, Surface, SurfacePoint};
 
 /// The robot's touchable surfaces.
 pub(crate) struct Skin {
     surfaces: Vec<Option<Surface>>,
+    /// The smooth bodies that they may stand for, where these were asked for.
+    bodies: Vec<Option<SmoothBody>>,
     links: Vec<usize>,
     /// Area of the touchable links up to and with each one, m².
     cumulative_area: Vec<f64>,
@@ -29,10 +31,27 @@ impl Skin {
             })
             .collect();
         (!links.is_empty()).then_some(Self {
+            bodies: Vec::new(),
             surfaces,
             links,
             cumulative_area,
         })
+    }
+
+    /// Adds the smooth bodies that the links' meshes may stand for.
+    pub(crate) fn with_bodies(mut self, robot: &Robot) -> Self {
+        let body = |(link, own): (&palpate_model::Link, &Option<Surface>)| {
+            let mesh = link.mesh.as_ref().filter(|_| own.is_some())?;
+            Some(SmoothBody::new(mesh))
+        };
+        let pairs = robot.links.iter().zip(&self.surfaces);
+        self.bodies = pairs.map(body).collect();
+        self
+    }
+
+    /// The smooth body of a link; none unless they were asked for.
+    pub(crate) fn body(&self, link: usize) -> Option<&SmoothBody> {
+        self.bodies.get(link)?.as_ref()
     }
 
     /// Indices of the touchable links.

@@ -2,8 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix3x2, Point3, Rotation3, Unit, Vector3, Vector4};
 
-use super::obstacle::{Core, LINK_RADIUS, RADIUS_RANGE, Touch, touch};
-use palpate_model::Surface;
+use super::obstacle::{Core, LINK_RADIUS, RADIUS_RANGE, Shape, Touch, touch};
 
 /// Coordinates x = (a, b, ρ, φ): the contact moved by a and b along the surface, m; the logarithm ρ of the radius; and
 /// for a bar the turn φ of its axis about the normal. The centre is c = p + (a u + b v)(1 + d/R) + d exp(ρ) n̂.
@@ -58,12 +57,12 @@ impl Chart {
     }
 
     /// The core at x, in the root frame.
-    pub(super) fn core(&self, surface: &Surface, x: &Vector4<f64>) -> Core {
+    pub(super) fn core(&self, shape: &Shape, x: &Vector4<f64>) -> Core {
         let local = Vector3::new(x[0] * self.spread, x[1] * self.spread, self.radius(x));
         let centre = self.foot + self.axes * local;
         let axis = self.axis.map(|axis| {
             let ball = Core { centre, axis: None };
-            let normal = touch(surface, &ball, self.triangle, 0.0).normal;
+            let normal = touch(shape, &ball, self.triangle, 0.0).normal;
             tangential(&axis, &normal, x[3])
         });
         Core { centre, axis }.moved(&self.root_from_link)

@@ -5,9 +5,10 @@ use palpate_model::Robot;
 
 use super::chart::tangential;
 use super::evidence::Evidence;
+use super::likeness::Likeness;
 use super::memory::Keyframe;
 use super::noise::Noise;
-use super::obstacle::{Core, Obstacle, Touch};
+use super::obstacle::{Core, Obstacle, Shape, Touch};
 use crate::skin::Skin;
 
 /// The history of the present contact, as one step sees it.
@@ -18,6 +19,31 @@ pub(super) struct History<'a> {
     /// Keyframes, oldest first; never empty.
     pub(super) keyframes: &'a [Keyframe],
     pub(super) noise: &'a Noise,
+}
+
+/// A place on a link.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) link: usize,
+    pub(super) likeness: Likeness,
+    pub(super) triangle: u32,
+    /// In the link's frame, m.
+    pub(super) point: Point3<f64>,
+    /// Outward normal in the link's frame.
+    pub(super) normal: Unit<Vector3<f64>>,
+}
+
+impl Place {
+    /// Where an obstacle touches.
+    pub(super) fn of(obstacle: &Obstacle, touch: &Touch) -> Self {
+        Self {
+            link: obstacle.link as usize,
+            likeness: obstacle.likeness,
+            triangle: touch.triangle,
+            point: touch.point,
+            normal: touch.normal,
+        }
+    }
 }
 
 impl History<'_> {
@@ -48,35 +74,34 @@ impl History<'_> {
         obstacle.log_prior(distance, self.skin.area())
     }
 
+    /// The shape of the link that an obstacle touches.
+    pub(super) fn shape(&self, obstacle: &Obstacle) -> Shape<'_> {
+        obstacle.shape(self.skin)
+    }
+
     /// Where an obstacle touches at the newest keyframe.
     pub(super) fn newest_touch(&self, obstacle: &Obstacle) -> Touch {
         obstacle.touch(self.skin, self.newest_link_from_root(obstacle.link))
     }
 
-    /// An obstacle of the given radius (m) that touches a link at a point with an outward normal, both in the link's
-    /// frame, at the newest keyframe; a ball, or a bar at an angle `turn` (rad) about the normal.
-    pub(super) fn obstacle_on(
-        &self,
-        link: usize,
-        triangle: u32,
-        point: &Point3<f64>,
-        normal: &Unit<Vector3<f64>>,
-        radius: f64,
-        turn: Option<f64>,
-    ) -> Obstacle {
+    /// An obstacle of the given radius (m) that touches at the newest keyframe; a ball, or a bar at an angle `turn`
+    /// (rad) about the normal.
+    pub(super) fn obstacle_at(&self, place: &Place, radius: f64, turn: Option<f64>) -> Obstacle {
+        let &Place { link, normal, .. } = place;
         let side = if normal.x.abs() < 0.7 {
             Vector3::x_axis()
         } else {
             Vector3::y_axis()
         };
         let core = Core {
-            centre: point + normal.into_inner() * radius,
-            axis: turn.map(|turn| tangential(&side, normal, turn)),
+            centre: place.point + normal.into_inner() * radius,
+            axis: turn.map(|turn| tangential(&side, &normal, turn)),
         };
         let root_from_link = self.newest_link_from_root(link as u16).inverse();
         Obstacle {
             link: link as u16,
-            triangle,
+            likeness: place.likeness,
+            triangle: place.triangle,
             core: core.moved(&root_from_link),
         }
     }
@@ -84,14 +109,6 @@ impl History<'_> {
     /// The same contact with the same radius, but as a ball, or as a bar at an angle `turn` about the normal.
     pub(super) fn reshaped(&self, obstacle: &Obstacle, turn: Option<f64>) -> Obstacle {
         let touch = self.newest_touch(obstacle);
-        let (link, radius) = (obstacle.link as usize, touch.distance);
-        self.obstacle_on(
-            link,
-            touch.triangle,
-            &touch.point,
-            &touch.normal,
-            radius,
-            turn,
-        )
+        self.obstacle_at(&Place::of(obstacle, &touch), touch.distance, turn)
     }
 }

@@ -10,6 +10,7 @@ mod agenda;
 mod chart;
 mod evidence;
 mod history;
+mod likeness;
 mod memory;
 mod moves;
 mod noise;
@@ -18,6 +19,7 @@ mod parameters;
 mod peaks;
 mod scan;
 mod sight;
+mod sums;
 mod work;
 
 use nalgebra::Matrix3;

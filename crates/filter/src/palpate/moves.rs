@@ -7,6 +7,7 @@ use rand_distr::StandardNormal;
 use super::Hypothesis;
 use super::chart::tangential;
 use super::history::History;
+use super::likeness::Likeness;
 use super::obstacle::{Core, Obstacle};
 use super::peaks::Peak;
 
@@ -21,7 +22,7 @@ const PRIOR_SHARE: f64 = 0.05;
 pub(super) struct Proposals<'a> {
     history: History<'a>,
     others: &'a [Hypothesis],
-    /// Indices of the others by link and kind: balls at 2 × link, bars at 2 × link + 1.
+    /// Indices of the others by [`kind`].
     akin: Vec<Vec<u32>>,
     peaks: &'a [Peak],
     /// Share of the draws that each peak has; they sum to one.
@@ -30,7 +31,7 @@ pub(super) struct Proposals<'a> {
 
 impl<'a> Proposals<'a> {
     pub(super) fn new(history: History<'a>, others: &'a [Hypothesis], peaks: &'a [Peak]) -> Self {
-        let mut akin = vec![Vec::new(); 2 * history.robot.links.len()];
+        let mut akin = vec![Vec::new(); 2 * Likeness::ALL.len() * history.robot.links.len()];
         for (index, other) in others.iter().enumerate() {
             akin[kind(&other.obstacle)].push(index as u32);
         }
@@ -57,7 +58,8 @@ impl<'a> Proposals<'a> {
             r if r < 0.3 => self.jump(particle, random),
             r if r < 0.55 => self.wander(particle, random),
             r if r < 0.75 => self.differ(particle, random),
-            r if r < 0.85 => self.breathe(particle, random),
+            r if r < 0.8 => self.breathe(particle, random),
+            r if r < 0.85 => self.liken(particle, random),
             _ => self.slide(particle, random),
         }
     }
@@ -210,6 +212,15 @@ impl<'a> Proposals<'a> {
         self.decide(particle, obstacle, back_over_forth, random);
     }
 
+    /// Takes the link for something else.
+    fn liken(&self, particle: &mut Hypothesis, random: &mut impl Rng) {
+        let obstacle = Obstacle {
+            likeness: particle.obstacle.likeness.other(random),
+            ..particle.obstacle
+        };
+        self.decide(particle, obstacle, 0.0, random);
+    }
+
     /// Slides along the surface, the farther the larger the radius; a bar turns as well.
     fn slide(&self, particle: &mut Hypothesis, random: &mut impl Rng) {
         let touch = self.history.newest_touch(&particle.obstacle);
@@ -235,7 +246,8 @@ impl<'a> Proposals<'a> {
 }
 
 fn kind(obstacle: &Obstacle) -> usize {
-    2 * obstacle.link as usize + usize::from(obstacle.core.axis.is_some())
+    let is_bar = usize::from(obstacle.core.axis.is_some());
+    (obstacle.link as usize * Likeness::ALL.len() + obstacle.likeness as usize) * 2 + is_bar
 }
 
 fn gauss(random: &mut impl Rng) -> Vector3<f64> {

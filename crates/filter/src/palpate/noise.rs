@@ -60,15 +60,6 @@ impl ResidualSums {
     }
 }
 
-/// The effect of a bias of one scale on one joint's sums.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Bias {
-    /// 1 / (Σ weight + 1 / variance).
-    pub(super) gain: f64,
-    /// gain × Σ weight × torque.
-    pub(super) mean: f64,
-}
-
 /// The noise model and the sums over the history that do not depend on a hypothesis.
 pub(super) struct Noise {
     /// Variance of a sample's white noise, Nm².
@@ -82,8 +73,10 @@ pub(super) struct Noise {
     seen: f64,
     second_difference: Vec<f64>,
     square: Vec<f64>,
-    bias: [Vec<Bias>; BIAS_SCALES.len()],
-    base: [f64; BIAS_SCALES.len()],
+    /// Log evidence of each joint's torques if nothing touched, for one scale of the biases.
+    base: [Vec<f64>; BIAS_SCALES.len()],
+    /// Half of the log of each joint's weights, summed.
+    log_weights: Vec<f64>,
     /// Inverse variances, joint by joint for each keyframe.
     weights: Vec<f64>,
 }
@@ -98,8 +91,8 @@ impl Noise {
             seen: 0.0,
             second_difference: vec![0.0; dof],
             square: vec![0.0; dof],
-            bias: std::array::from_fn(|_| vec![Bias::default(); dof]),
-            base: [0.0; BIAS_SCALES.len()],
+            base: std::array::from_fn(|_| vec![0.0; dof]),
+            log_weights: vec![0.0; dof],
             weights: Vec::new(),
         }
     }
@@ -202,7 +195,6 @@ impl Noise {
 
     /// Sums over the history what all hypotheses share.
     pub(super) fn sum(&mut self, keyframes: &[Keyframe]) {
-        self.base = [0.0; BIAS_SCALES.len()];
         self.weights.clear();
         for keyframe in keyframes {
             for joint in 0..self.white.len() {
@@ -218,14 +210,11 @@ impl Noise {
                 second += w * keyframe.torque[joint].powi(2);
                 log += w.ln();
             }
+            self.log_weights[joint] = 0.5 * log;
             for (scale, sigma) in BIAS_SCALES.into_iter().enumerate() {
                 let variance = sigma * sigma;
                 let gain = 1.0 / (weight + 1.0 / variance);
-                self.bias[scale][joint] = Bias {
-                    gain,
-                    mean: gain * first,
-                };
-                self.base[scale] +=
+                self.base[scale][joint] =
                     0.5 * (log - second + gain * first * first - (1.0 + variance * weight).ln());
             }
         }
@@ -235,12 +224,16 @@ impl Noise {
         BIAS_SCALES.len()
     }
 
-    pub(super) fn bias(&self, scale: usize, joint: usize) -> Bias {
-        self.bias[scale][joint]
+    /// Standard deviation of the biases of one scale, Nm.
+    pub(super) fn bias_scale(&self, scale: usize) -> f64 {
+        BIAS_SCALES[scale]
     }
 
-    /// Log evidence of the torques if nothing touched, for one scale of the biases.
-    pub(super) fn base(&self, scale: usize) -> f64 {
-        self.base[scale]
+    /// Log evidence of the torques of all joints beside a path, which feel nothing, and for those of the path the
+    /// noise's log density but for the products with its inverse covariance.
+    pub(super) fn base_beside(&self, scale: usize, path: &[usize]) -> f64 {
+        let all: f64 = self.base[scale].iter().sum();
+        let own = |&joint: &usize| self.log_weights[joint] - self.base[scale][joint];
+        all + path.iter().map(own).sum::<f64>()
     }
 }

@@ -1,12 +1,14 @@
 //! A hypothesis about the obstacle: locally a ball or a bar that rests in the world, pressed against one link.
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
-use palpate_model::{Robot, Surface};
+use palpate_model::{Robot, SmoothBody, Surface};
 
-use super::evidence::{Evidence, JointTorque, Sums};
+use super::evidence::{self, Evidence, MOST_JOINTS};
 use super::history::History;
+use super::likeness::Likeness;
 use super::memory::{Keyframe, LinkView};
 use super::noise::Noise;
+use super::sums::{Directions, Lever, Sums};
 use crate::skin::Skin;
 
 /// Speed at which friction has half its strength, m/s: below it the contact rather sticks.
@@ -44,10 +46,19 @@ impl Core {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Obstacle {
     pub(super) link: u16,
+    /// What the link is taken for.
+    pub(super) likeness: Likeness,
     /// Triangle that the contact was on when last looked at: where the next projection starts.
     pub(super) triangle: u32,
     /// The core in the root frame.
     pub(super) core: Core,
+}
+
+/// A link's shape: its mesh, or the smooth body that the mesh stands for.
+#[derive(Clone, Copy)]
+pub(super) struct Shape<'a> {
+    surface: &'a Surface,
+    body: Option<&'a SmoothBody>,
 }
 
 /// Where an obstacle touches its link in one configuration.
@@ -66,13 +77,13 @@ pub(super) struct Touch {
 
 /// The contact: the link's point nearest to the core (the paper's figure 2). For a bar, `along` is a first guess of
 /// the way along its axis.
-pub(super) fn touch(surface: &Surface, core_in_link: &Core, start: u32, along: f64) -> Touch {
+pub(super) fn touch(shape: &Shape, core_in_link: &Core, start: u32, along: f64) -> Touch {
     let Some(axis) = core_in_link.axis else {
-        return touch_ball(surface, &core_in_link.centre, start);
+        return touch_ball(shape, &core_in_link.centre, start);
     };
     let at = |along: f64, start: u32| {
         let centre = core_in_link.centre + axis.into_inner() * along;
-        let touch = touch_ball(surface, &centre, start);
+        let touch = touch_ball(shape, &centre, start);
         // Zero where the point of the bar is the one nearest to its own projection.
         let miss = axis.dot(&(touch.point - centre));
         (Touch { along, ..touch }, miss)
@@ -96,7 +107,18 @@ pub(super) fn touch(surface: &Surface, core_in_link: &Core, start: u32, along: f
 }
 
 /// The contact with a ball around `centre`.
-fn touch_ball(surface: &Surface, centre: &Point3<f64>, start: u32) -> Touch {
+fn touch_ball(shape: &Shape, centre: &Point3<f64>, start: u32) -> Touch {
+    let surface = shape.surface;
+    if let Some(body) = shape.body {
+        let nearest = body.closest_point_from(surface, centre, start);
+        return Touch {
+            point: nearest.point,
+            triangle: nearest.triangle,
+            normal: nearest.normal,
+            distance: nearest.distance,
+            along: 0.0,
+        };
+    }
     let nearest = surface.closest_point_from(centre, start);
     let face = surface.normal(nearest.triangle);
     let away = centre - nearest.point;
@@ -116,21 +138,33 @@ fn touch_ball(surface: &Surface, centre: &Point3<f64>, start: u32) -> Touch {
 }
 
 impl LinkView {
-    /// Direction of the friction on the link at a touch, in the link's frame: against the slip, shorter when slow.
-    fn friction_direction(&self, touch: &Touch) -> Vector3<f64> {
+    /// Directions of the forces on the link at a touch.
+    fn directions(&self, touch: &Touch) -> Directions {
         let linear: Vector3<f64> = self.velocity.fixed_rows::<3>(0).into_owned();
         let angular: Vector3<f64> = self.velocity.fixed_rows::<3>(3).into_owned();
         let velocity = linear + angular.cross(&touch.point.coords);
         let slip = velocity - touch.normal.into_inner() * velocity.dot(&touch.normal);
-        slip * (-1.0 / (slip.norm() + STICKING_SPEED))
+        Directions {
+            push: -touch.normal.into_inner(),
+            rub: slip * (-1.0 / (slip.norm() + STICKING_SPEED)),
+        }
     }
 }
 
 impl Obstacle {
+    /// The shape of the link that it touches.
+    pub(super) fn shape<'a>(&self, skin: &'a Skin) -> Shape<'a> {
+        let link = self.link as usize;
+        Shape {
+            surface: skin.surface(link),
+            body: skin.body(link).filter(|_| self.likeness.is_smooth()),
+        }
+    }
+
     /// Where it touches, in the configuration that `link_from_root` belongs to.
     pub(super) fn touch(&self, skin: &Skin, link_from_root: &Isometry3<f64>) -> Touch {
         touch(
-            skin.surface(self.link as usize),
+            &self.shape(skin),
             &self.core.moved(link_from_root),
             self.triangle,
             0.0,
@@ -148,14 +182,17 @@ impl Obstacle {
     ) -> Evidence {
         let link = self.link as usize;
         let path = &robot.links[link].path;
-        let mut sums = Sums::default();
+        let mut sums = Sums::new(self.likeness);
+        let mut levers = [Lever::default(); MOST_JOINTS];
         let mut newest: Option<Touch> = None;
         self.follow(skin, keyframes, |index, keyframe, touch| {
             let e = newest.get_or_insert(touch).distance - touch.distance;
-            sums.add(
-                e,
-                joint_torques(&keyframe.links[link], keyframe, index, &touch, path, noise),
-            );
+            let view = &keyframe.links[link];
+            let felt = levers_of(keyframe, index, link, &touch, path, noise);
+            for (lever, felt) in levers.iter_mut().zip(felt) {
+                *lever = felt;
+            }
+            sums.add(e, &view.directions(&touch), &levers[..path.len()]);
         });
         let Some(newest) = newest else {
             return Evidence::default();
@@ -166,7 +203,7 @@ impl Obstacle {
         }
         Evidence {
             reference: newest.distance,
-            ..sums.evidence(noise, path)
+            ..evidence::evidence(&sums, noise, path)
         }
     }
 
@@ -178,10 +215,11 @@ impl Obstacle {
         mut visit: impl FnMut(usize, &'a Keyframe, Touch),
     ) {
         let link = self.link as usize;
+        let shape = self.shape(skin);
         let (mut start, mut along) = (self.triangle, 0.0);
         for (index, keyframe) in keyframes.iter().enumerate().rev() {
             let core = self.core.moved(&keyframe.links[link].link_from_root);
-            let touch = touch(skin.surface(link), &core, start, along);
+            let touch = touch(&shape, &core, start, along);
             (start, along) = (touch.triangle, touch.along);
             visit(index, keyframe, touch);
         }
@@ -193,7 +231,7 @@ impl Obstacle {
         &self,
         evidence: &Evidence,
         history: &History,
-        mut take: impl FnMut(f64, usize, JointTorque),
+        mut take: impl FnMut(f64, usize, Lever),
     ) {
         let mut newest = None;
         self.follow(history.skin, history.keyframes, |index, _, touch| {
@@ -209,7 +247,7 @@ impl Obstacle {
         &self,
         evidence: &Evidence,
         history: &History,
-        mut take: impl FnMut(f64, usize, JointTorque),
+        mut take: impl FnMut(f64, usize, Lever),
     ) {
         let touch = history.newest_touch(self);
         let force = evidence.force_at(touch.distance);
@@ -225,51 +263,43 @@ impl Obstacle {
         index: usize,
         touch: &Touch,
         force: f64,
-        take: &mut impl FnMut(f64, usize, JointTorque),
+        take: &mut impl FnMut(f64, usize, Lever),
     ) {
         let link = self.link as usize;
         let path = &history.robot.links[link].path;
         let keyframe = &history.keyframes[index];
-        let view = &keyframe.links[link];
-        let torques = joint_torques(view, keyframe, index, touch, path, history.noise);
-        for (torque, &joint) in torques.zip(path) {
-            let unit = torque.normal + evidence.friction * torque.tangential;
-            take(unit * force, joint, torque);
+        let Directions { push, rub } = keyframe.links[link].directions(touch);
+        let unit = push + rub * evidence.friction + evidence.tilt;
+        let slack = (self.likeness.slack() * force).powi(2);
+        for (lever, &joint) in
+            levers_of(keyframe, index, link, touch, path, history.noise).zip(path)
+        {
+            let weight = 1.0 / (1.0 / lever.weight + slack * lever.row.norm_squared());
+            take(
+                lever.row.dot(&unit) * force,
+                joint,
+                Lever { weight, ..lever },
+            );
         }
     }
 }
 
-fn joint_torques<'a>(
-    view: &'a LinkView,
+/// How the joints of a link's path feel a force at a touch in one keyframe.
+fn levers_of<'a>(
     keyframe: &'a Keyframe,
     index: usize,
+    link: usize,
     touch: &Touch,
     path: &'a [usize],
     noise: &'a Noise,
-) -> impl Iterator<Item = JointTorque> + 'a {
-    let push = -touch.normal.into_inner();
-    let push_moment = touch.point.coords.cross(&push);
-    let rub = view.friction_direction(touch);
-    let rub_moment = touch.point.coords.cross(&rub);
-    view.screws
-        .column_iter()
-        .zip(path)
-        .map(move |(screw, &joint)| {
-            let apply = |force: &Vector3<f64>, moment: &Vector3<f64>| {
-                screw[0] * force.x
-                    + screw[1] * force.y
-                    + screw[2] * force.z
-                    + screw[3] * moment.x
-                    + screw[4] * moment.y
-                    + screw[5] * moment.z
-            };
-            JointTorque {
-                normal: apply(&push, &push_moment),
-                tangential: apply(&rub, &rub_moment),
-                measured: keyframe.torque[joint],
-                weight: noise.weight(index, joint),
-            }
-        })
+) -> impl Iterator<Item = Lever> + 'a {
+    let point = touch.point.coords;
+    let screws = keyframe.links[link].screws.column_iter();
+    screws.zip(path).map(move |(screw, &joint)| Lever {
+        row: screw.fixed_rows::<3>(0) + screw.fixed_rows::<3>(3).cross(&point),
+        measured: keyframe.torque[joint],
+        weight: noise.weight(index, joint),
+    })
 }
 
 impl Obstacle {

@@ -144,9 +144,9 @@ impl Peak {
 
     /// The obstacle at x in the peak's chart.
     pub(super) fn at(&self, x: &Vector4<f64>, history: &History) -> Obstacle {
-        let surface = history.skin.surface(self.obstacle.link as usize);
+        let shape = history.shape(&self.obstacle);
         Obstacle {
-            core: self.chart.core(surface, x),
+            core: self.chart.core(&shape, x),
             ..self.obstacle
         }
     }
@@ -188,9 +188,9 @@ impl Peak {
         random: &mut impl Rng,
     ) -> Core {
         let gauss = Vector4::from_fn(|_, _| random.sample::<f64, _>(StandardNormal));
-        let surface = history.skin.surface(self.obstacle.link as usize);
+        let shape = history.shape(&self.obstacle);
         self.chart
-            .core(surface, &(x + self.root * gauss * deviations))
+            .core(&shape, &(x + self.root * gauss * deviations))
     }
 
     /// Coordinates of a core in the peak's chart, with the log of the volume element.
@@ -218,6 +218,7 @@ impl Peak {
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let radius = |peak: &Self| peak.touch.distance.max(1e-3).ln();
         self.obstacle.link == other.obstacle.link
+            && self.obstacle.likeness == other.obstacle.likeness
             && self.obstacle.core.axis.is_some() == other.obstacle.core.axis.is_some()
             && (self.touch.point - other.touch.point).norm() < 4e-3
             && (radius(self) - radius(other)).abs() < 0.5
@@ -226,12 +227,13 @@ impl Peak {
     /// Whether this peak is of the same link and kind as an obstacle.
     pub(super) fn is_akin(&self, obstacle: &Obstacle) -> bool {
         self.obstacle.link == obstacle.link
+            && self.obstacle.likeness == obstacle.likeness
             && self.obstacle.core.axis.is_some() == obstacle.core.axis.is_some()
     }
 }
 
 /// Most peaks kept.
-const MOST: usize = 16;
+const MOST: usize = 24;
 
 /// Leaves the peaks with the largest mass, each once, the largest first.
 pub(super) fn keep_best(peaks: &mut Vec<Peak>) {

@@ -4,7 +4,8 @@ use nalgebra::{Matrix6, Vector6};
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
 
-use super::history::History;
+use super::history::{History, Place};
+use super::likeness::Likeness;
 use super::peaks::Peak;
 use crate::random::{Purpose, stream};
 
@@ -32,6 +33,7 @@ const SLACK_SHARE: f64 = 0.05;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
     link: usize,
+    likeness: Likeness,
     triangle: u32,
     /// Squared normalised error that a push on the triangle's centre leaves.
     misfit: f64,
@@ -47,41 +49,38 @@ pub(super) fn candidates(history: &History, seed: u64, key: u64) -> Vec<Candidat
     let links = history.skin.links();
     let of_link =
         |&link: &usize| of_link(history, link, &mut stream(seed, key, link, Purpose::Fresh));
-    links.par_iter().flat_map_iter(of_link).collect()
+    let flat: Vec<Candidate> = links.par_iter().flat_map_iter(of_link).collect();
+    let taken_for = |likeness| {
+        let candidate = move |&candidate: &Candidate| Candidate {
+            likeness,
+            ..candidate
+        };
+        flat.iter().map(candidate)
+    };
+    (taken_for(Likeness::Body).chain(taken_for(Likeness::Mesh))).collect()
 }
 
 /// Climbs from a candidate as a ball.
 pub(super) fn climb_ball(history: &History, candidate: &Candidate) -> Peak {
-    let surface = history.skin.surface(candidate.link);
-    let (foot, normal) = (
-        surface.centroid(candidate.triangle),
-        surface.normal(candidate.triangle),
-    );
-    let start = |radius: f64| {
-        let triangle = candidate.triangle;
-        Peak::new(
-            history.obstacle_on(candidate.link, triangle, &foot, &normal, radius, None),
-            history,
-        )
+    let &Candidate { link, likeness, .. } = candidate;
+    let triangle = candidate.triangle;
+    let surface = history.skin.surface(link);
+    let place = Place {
+        link,
+        likeness,
+        triangle,
+        point: surface.centroid(triangle),
+        normal: surface.normal(triangle),
     };
+    let start = |radius| Peak::new(history.obstacle_at(&place, radius, None), history);
     climb_best(history, RADII.map(start).into_iter())
 }
 
 /// Climbs as a bar from where a peak is.
 pub(super) fn climb_bar(history: &History, ball: &Peak) -> Peak {
-    let link = ball.obstacle.link as usize;
-    let (touch, radius) = (&ball.touch, ball.touch.distance);
     let start = |direction: usize| {
         let turn = Some(std::f64::consts::PI * direction as f64 / DIRECTIONS as f64);
-        let bar = history.obstacle_on(
-            link,
-            touch.triangle,
-            &touch.point,
-            &touch.normal,
-            radius,
-            turn,
-        );
-        Peak::new(bar, history)
+        Peak::new(history.reshaped(&ball.obstacle, turn), history)
     };
     climb_best(history, (0..DIRECTIONS).map(start))
 }
@@ -136,6 +135,7 @@ fn of_link(history: &History, link: usize, random: &mut impl Rng) -> Vec<Candida
     let misfits: Vec<f64> = (0..surface.triangle_count() as u32).map(misfit).collect();
     let candidate = |triangle: u32| Candidate {
         link,
+        likeness: Likeness::Mesh,
         triangle,
         misfit: misfits[triangle as usize],
     };

@@ -6,7 +6,8 @@ use rand::{Rng, RngExt};
 use rayon::prelude::*;
 
 use super::agenda::Phase;
-use super::history::History;
+use super::history::{History, Place};
+use super::likeness::Likeness;
 use super::moves::Proposals;
 use super::obstacle::{Obstacle, RADIUS_RANGE};
 use super::peaks::{Peak, keep_best};
@@ -159,10 +160,17 @@ impl PalpateFilter {
     fn hop_start(&self, index: usize, history: &History) -> Obstacle {
         let mut random = stream(self.seed, self.key, index, Purpose::Hop);
         match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
-            Some(peak) => Obstacle {
-                core: peak.draw(history, &mut random),
-                ..peak.obstacle
-            },
+            Some(peak) => {
+                let own = peak.obstacle.likeness;
+                Obstacle {
+                    core: peak.draw(history, &mut random),
+                    likeness: match random.random::<bool>() {
+                        true => own.other(&mut random),
+                        false => own,
+                    },
+                    ..peak.obstacle
+                }
+            }
             None => {
                 let particle = &self.particles[random.random_range(0..self.particles.len())];
                 let turn = std::f64::consts::PI * random.random::<f64>();
@@ -256,11 +264,16 @@ fn draw(history: &History, random: &mut impl Rng) -> Hypothesis {
     let (link, place) = history.skin.sample(random.random());
     let [least, most] = RADIUS_RANGE;
     let radius = least * (most / least).powf(random.random());
-    let normal = history.skin.surface(link).normal(place.triangle);
+    let place = Place {
+        link,
+        likeness: Likeness::draw(random),
+        triangle: place.triangle,
+        point: place.point,
+        normal: history.skin.surface(link).normal(place.triangle),
+    };
     let turn = std::f64::consts::PI * random.random::<f64>();
     let bar = random.random::<bool>().then_some(turn);
-    let mut obstacle =
-        history.obstacle_on(link, place.triangle, &place.point, &normal, radius, bar);
+    let mut obstacle = history.obstacle_at(&place, radius, bar);
     let evidence = history.evidence(&mut obstacle);
     let log_prior = history.log_prior(&obstacle, radius);
     Hypothesis {

@@ -1,0 +1,289 @@
+//! What a contact's history says about one obstacle, as sums of products over the keyframes.
+//!
+//! The torques of a keyframe are linear in the unknowns: y = J (n + μ t + ε)(F₀ + K e) + b + noise, with J the contact's
+//! Jacobian, n the unit push, t the rub against the slip, b the joints' biases and ε the tilt of the push. The noise is
+//! that of the joints, of inverse covariance W, and a slack: a force of variance s² in any direction at the contact,
+//! so that its covariance is W⁻¹ + s² J Jᵀ. Products with the inverse of that follow from G = Jᵀ W J, h = Jᵀ W y and
+//! A = 1 + s² G (Woodbury): Jᵀ(…)⁻¹J = G A⁻¹ and Jᵀ(…)⁻¹y = A⁻¹ h.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::evidence::{FORCE_SCALE, MOST_JOINTS};
+use super::likeness::Likeness;
+use super::noise::Noise;
+
+/// Number of columns that products are kept of: J n, e J n, J t, e J t and y.
+pub(super) const COLUMNS: usize = 5;
+/// Most unknowns that are integrated out: the biases of the path's joints, then the three components of the tilt.
+const MOST_NUISANCES: usize = MOST_JOINTS + 3;
+
+type Rows = [[f64; COLUMNS]; MOST_NUISANCES];
+type Square = [[f64; MOST_NUISANCES]; MOST_NUISANCES];
+
+/// How one joint of the path feels a force at the contact in one keyframe.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Lever {
+    /// Torque of a unit force along each axis of the link's frame, Nm/N: a row of J.
+    pub(super) row: Vector3<f64>,
+    /// Measured torque y, Nm.
+    pub(super) measured: f64,
+    /// Inverse variance of the measured torque: W is diagonal.
+    pub(super) weight: f64,
+}
+
+/// Directions, in the link's frame, of the forces at a contact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Directions {
+    /// Unit vector of the push n.
+    pub(super) push: Vector3<f64>,
+    /// Rub t: against the slip, shorter than one where that is slow.
+    pub(super) rub: Vector3<f64>,
+}
+
+/// Products over the history for one hypothesis.
+#[derive(Clone, Debug)]
+pub(super) struct Sums {
+    likeness: Likeness,
+    /// Products of the columns with each other; row ≤ column.
+    gram: [[f64; COLUMNS]; COLUMNS],
+    /// Products of the nuisances with the columns.
+    rows: Rows,
+    /// Products of the nuisances with each other; row ≥ column.
+    mixed: Square,
+    /// Half of the log of what the slack multiplies the determinant of the noise covariance by.
+    log_slack: f64,
+}
+
+/// The forces of one keyframe, with A⁻¹ applied.
+struct Slackened {
+    /// Most likely size of the push, as this keyframe alone has it, N.
+    force: f64,
+    /// Variance s² of the slack, N².
+    variance: f64,
+    inverse: Matrix3<f64>,
+    /// A⁻¹ n and A⁻¹ t.
+    push: Vector3<f64>,
+    rub: Vector3<f64>,
+    /// G A⁻¹ n, G A⁻¹ t and A⁻¹ h.
+    with_push: Vector3<f64>,
+    with_rub: Vector3<f64>,
+    with_torque: Vector3<f64>,
+}
+
+impl Sums {
+    /// Sums over nothing yet.
+    pub(super) fn new(likeness: Likeness) -> Self {
+        Self {
+            likeness,
+            gram: [[0.0; COLUMNS]; COLUMNS],
+            rows: [[0.0; COLUMNS]; MOST_NUISANCES],
+            mixed: [[0.0; MOST_NUISANCES]; MOST_NUISANCES],
+            log_slack: 0.0,
+        }
+    }
+
+    /// Adds one keyframe with approach e = d₀ − d, m.
+    pub(super) fn add(&mut self, e: f64, directions: &Directions, levers: &[Lever]) {
+        let (mut g, mut h) = (Matrix3::zeros(), Vector3::zeros());
+        for lever in levers {
+            let weighted = lever.row * lever.weight;
+            g += weighted * lever.row.transpose();
+            h += weighted * lever.measured;
+        }
+        let slackened = self.slacken(directions, &g, &h);
+        self.add_columns(e, directions, &slackened);
+        self.gram[4][4] -= slackened.variance * h.dot(&slackened.with_torque);
+        for (index, lever) in levers.iter().enumerate() {
+            self.add_bias(e, index, lever, &slackened);
+        }
+        if self.likeness.tilt() > 0.0 {
+            self.mix(levers, &slackened, &g);
+            self.add_tilt(e, levers.len(), &slackened);
+        }
+    }
+
+    fn slacken(
+        &mut self,
+        directions: &Directions,
+        g: &Matrix3<f64>,
+        h: &Vector3<f64>,
+    ) -> Slackened {
+        let Directions { push, rub } = directions;
+        let (g_push, g_rub) = (g * push, g * rub);
+        let force = push.dot(h).max(0.0) / (push.dot(&g_push) + FORCE_SCALE.powi(-2));
+        let variance = (self.likeness.slack() * force).powi(2);
+        let a = Matrix3::identity() + g * variance;
+        let mut inverse = a;
+        if variance > 0.0 {
+            self.log_slack += 0.5 * a.determinant().ln();
+            inverse = a.try_inverse().unwrap_or_else(Matrix3::identity);
+        }
+        Slackened {
+            force,
+            variance,
+            push: inverse * push,
+            rub: inverse * rub,
+            with_push: inverse * g_push,
+            with_rub: inverse * g_rub,
+            with_torque: inverse * h,
+            inverse,
+        }
+    }
+
+    fn add_columns(&mut self, e: f64, directions: &Directions, slackened: &Slackened) {
+        let Directions { push, rub } = directions;
+        let nn = push.dot(&slackened.with_push);
+        let nt = rub.dot(&slackened.with_push);
+        let tt = rub.dot(&slackened.with_rub);
+        let ny = push.dot(&slackened.with_torque);
+        let ty = rub.dot(&slackened.with_torque);
+        let products = [
+            [nn, nn * e, nt, nt * e, ny],
+            [0.0, nn * e * e, nt * e, nt * e * e, ny * e],
+            [0.0, 0.0, tt, tt * e, ty],
+            [0.0, 0.0, 0.0, tt * e * e, ty * e],
+        ];
+        for (sums, products) in self.gram.iter_mut().zip(&products) {
+            for (sum, product) in sums.iter_mut().zip(products) {
+                *sum += product;
+            }
+        }
+    }
+
+    fn add_bias(&mut self, e: f64, index: usize, lever: &Lever, slackened: &Slackened) {
+        let weight = lever.weight;
+        self.gram[4][4] += weight * lever.measured * lever.measured;
+        self.mixed[index][index] += weight;
+        let explained = slackened.variance * lever.row.dot(&slackened.with_torque);
+        self.add_row(
+            index,
+            e,
+            weight * lever.row.dot(&slackened.push),
+            weight * lever.row.dot(&slackened.rub),
+            weight * (lever.measured - explained),
+        );
+    }
+
+    /// Adds what the slack and the tilt have to do with the biases, and the tilt with itself.
+    fn mix(&mut self, levers: &[Lever], slackened: &Slackened, g: &Matrix3<f64>) {
+        let force = slackened.force;
+        let tilt = slackened.inverse * g * (force * force);
+        let (of_joints, of_tilt) = self.mixed.split_at_mut(levers.len());
+        for (index, lever) in levers.iter().enumerate() {
+            let pulled = slackened.inverse * lever.row * lever.weight;
+            for (other, mixed) in levers[..=index].iter().zip(&mut of_joints[index]) {
+                *mixed -= other.weight * slackened.variance * other.row.dot(&pulled);
+            }
+            for axis in 0..3 {
+                of_tilt[axis][index] += force * pulled[axis];
+            }
+        }
+        for axis in 0..3 {
+            for other in 0..=axis {
+                of_tilt[axis][levers.len() + other] += tilt[(axis, other)];
+            }
+        }
+    }
+
+    fn add_tilt(&mut self, e: f64, joints: usize, slackened: &Slackened) {
+        let force = slackened.force;
+        for axis in 0..3 {
+            self.add_row(
+                joints + axis,
+                e,
+                force * slackened.with_push[axis],
+                force * slackened.with_rub[axis],
+                force * slackened.with_torque[axis],
+            );
+        }
+    }
+
+    fn add_row(&mut self, index: usize, e: f64, n: f64, t: f64, y: f64) {
+        let products = [n, n * e, t, t * e, y];
+        for (sum, product) in self.rows[index].iter_mut().zip(products) {
+            *sum += product;
+        }
+    }
+
+    /// The products of the columns with the nuisances integrated out, for biases of one scale.
+    pub(super) fn reduced(&self, noise: &Noise, scale: usize, path: &[usize]) -> Reduced {
+        let tilt = self.likeness.tilt();
+        let count = path.len() + if tilt > 0.0 { 3 } else { 0 };
+        let mut gram = self.gram;
+        let mut factor = [[0.0; MOST_NUISANCES]; MOST_NUISANCES];
+        let mut white = [[0.0; COLUMNS]; MOST_NUISANCES];
+        // What the priors make of the determinant, by Cholesky's factorisation row by row.
+        let mut log_determinant = 0.0;
+        for i in 0..count {
+            let deviation = match i < path.len() {
+                true => noise.bias_scale(scale),
+                false => tilt,
+            };
+            let precision = 1.0 / (deviation * deviation);
+            let mut pivot = self.mixed[i][i] + precision;
+            let mut row = self.rows[i];
+            for j in 0..i {
+                let mut entry = self.mixed[i][j];
+                for k in 0..j {
+                    entry -= factor[i][k] * factor[j][k];
+                }
+                entry *= factor[j][j];
+                factor[i][j] = entry;
+                pivot -= entry * entry;
+                for (value, other) in row.iter_mut().zip(&white[j]) {
+                    *value -= entry * other;
+                }
+            }
+            let pivot = pivot.max(1e-9);
+            log_determinant += (pivot / precision).ln();
+            // Of the diagonal only the inverse is needed.
+            factor[i][i] = pivot.sqrt().recip();
+            white[i] = row.map(|value| value * factor[i][i]);
+            for (row, sums) in gram.iter_mut().enumerate() {
+                for column in row..COLUMNS {
+                    sums[column] -= white[i][row] * white[i][column];
+                }
+            }
+        }
+        let log_noise = noise.base_beside(scale, path) - self.log_slack;
+        Reduced {
+            log: log_noise - 0.5 * (log_determinant + gram[4][4]),
+            gram,
+            factor,
+            white,
+            joints: path.len(),
+        }
+    }
+}
+
+/// [`Sums`] with the nuisances integrated out.
+pub(super) struct Reduced {
+    /// Products of the columns with each other; row ≤ column.
+    pub(super) gram: [[f64; COLUMNS]; COLUMNS],
+    /// Log density of the torques if nothing pushed.
+    pub(super) log: f64,
+    /// Cholesky's factor of the nuisances' precision, with the inverse of its diagonal.
+    factor: Square,
+    /// The nuisances' products with the columns, the factor divided out.
+    white: Rows,
+    joints: usize,
+}
+
+impl Reduced {
+    /// Most probable tilt ε, for each column's coefficient but the torque's.
+    pub(super) fn tilt(&self, coefficients: [f64; COLUMNS - 1]) -> Vector3<f64> {
+        let mut tilt = Vector3::zeros();
+        for axis in (0..3).rev() {
+            let row = self.joints + axis;
+            let mut rest = self.white[row][COLUMNS - 1];
+            for (coefficient, column) in coefficients.iter().zip(&self.white[row]) {
+                rest -= coefficient * column;
+            }
+            for later in axis + 1..3 {
+                rest -= self.factor[self.joints + later][row] * tilt[later];
+            }
+            tilt[axis] = rest * self.factor[row][row];
+        }
+        tilt
+    }
+}
