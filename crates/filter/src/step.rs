@@ -22,7 +22,6 @@ pub(crate) struct Step<'a> {
     /// External torques at this sample without their bias, Nm or N.
     pub(crate) torque: &'a [f64],
     /// The bias taken out of each joint's torque, and how uncertain it is, Nm or N; it stays as it is in contact.
-    #[allow(dead_code, reason = "a method may do without it")]
     pub(crate) bias: &'a [JointBias],
     /// Number of the sample since the filter began; keys the random streams.
     pub(crate) number: u64,

@@ -2,13 +2,15 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use palpate_model::Robot;
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
 
 use super::chart::tangential;
 use super::evidence::Evidence;
 use super::likeness::Likeness;
 use super::memory::Keyframe;
 use super::noise::Noise;
-use super::obstacle::{Core, Obstacle, Shape, Touch};
+use super::obstacle::{Core, Obstacle, RADIUS_RANGE, Shape, Touch};
 use crate::skin::Skin;
 
 /// The history of the present contact, as one step sees it.
@@ -20,6 +22,9 @@ pub(super) struct History<'a> {
     pub(super) keyframes: &'a [Keyframe],
     pub(super) noise: &'a Noise,
 }
+
+/// How far beside a contact another one may be looked for, m.
+const BESIDE: [f64; 3] = [2e-3, 8e-3, 3e-2];
 
 /// A place on a link.
 #[derive(Clone, Copy, Debug)]
@@ -104,6 +109,30 @@ impl History<'_> {
             triangle: place.triangle,
             core: core.moved(&root_from_link),
         }
+    }
+
+    /// Another obstacle about where this one touches: somewhat beside it, of any kind and radius.
+    pub(super) fn elsewhere(&self, obstacle: &Obstacle, random: &mut impl Rng) -> Obstacle {
+        let touch = self.newest_touch(obstacle);
+        let link = obstacle.link as usize;
+        let reach = BESIDE[random.random_range(0..BESIDE.len())];
+        let way = Vector3::from_fn(|_, _| random.sample::<f64, _>(StandardNormal) * reach);
+        let surface = self.skin.surface(link);
+        let beside = surface.closest_point_from(&(touch.point + way), touch.triangle);
+        let place = Place {
+            link,
+            likeness: Likeness::draw(random),
+            triangle: beside.triangle,
+            point: beside.point,
+            normal: surface.normal(beside.triangle),
+        };
+        let [least, most] = RADIUS_RANGE;
+        let radius = match random.random::<bool>() {
+            true => touch.distance.clamp(least, most),
+            false => least * (most / least).powf(random.random()),
+        };
+        let turn = std::f64::consts::PI * random.random::<f64>();
+        self.obstacle_at(&place, radius, random.random::<bool>().then_some(turn))
     }
 
     /// The same contact with the same radius, but as a ball, or as a bar at an angle `turn` about the normal.

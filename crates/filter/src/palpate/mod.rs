@@ -126,6 +126,7 @@ impl PalpateFilter {
     fn take_in_keyframe(&mut self, step: &Step) {
         self.key = step.number;
         self.keyframes += 1;
+        self.noise.know_biases(step.bias);
         self.noise.sum(&self.memory.keyframes);
         if let Some((obstacle, evidence)) = self.best() {
             let history = history(step, &self.memory, &self.noise);

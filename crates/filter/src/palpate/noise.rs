@@ -4,9 +4,12 @@ use super::evidence::Evidence;
 use super::history::History;
 use super::memory::Keyframe;
 use super::obstacle::Obstacle;
+use crate::JointBias;
 
 /// Standard deviations that a bias may have, Nm: which one fits, the data tell.
 const BIAS_SCALES: [f64; 3] = [0.004, 0.05, 0.25];
+/// No bias is known better than this, Nm.
+const LEAST_BIAS_STD: f64 = 0.002;
 /// Noise that does not average out within a keyframe: absolute, Nm, and as a share of the joint's rms torque.
 const FLOOR: f64 = 0.01;
 const FLOOR_SHARE: f64 = 0.01;
@@ -60,6 +63,32 @@ impl ResidualSums {
     }
 }
 
+/// Gaussian prior of what is left of a joint's bias in the torques.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BiasPrior {
+    /// Nm.
+    pub(super) mean: f64,
+    /// Inverse variance, 1/Nm².
+    pub(super) precision: f64,
+    /// Log density of what was seen of the bias before the contact.
+    log: f64,
+}
+
+impl BiasPrior {
+    /// For biases of a scale s (Nm), of which one was found before the contact to be m ± σ and then taken out of the
+    /// torques: b ~ N(0, s²), m ~ N(b, σ²), and b − m is left.
+    fn new(scale: f64, found: &JointBias) -> Self {
+        let prior = scale * scale;
+        let seen = found.std.max(LEAST_BIAS_STD).powi(2);
+        let total = prior + seen;
+        Self {
+            mean: -found.mean * seen / total,
+            precision: total / (prior * seen),
+            log: -0.5 * (found.mean * found.mean / total + total.ln()),
+        }
+    }
+}
+
 /// The noise model and the sums over the history that do not depend on a hypothesis.
 pub(super) struct Noise {
     /// Variance of a sample's white noise, Nm².
@@ -73,6 +102,8 @@ pub(super) struct Noise {
     seen: f64,
     second_difference: Vec<f64>,
     square: Vec<f64>,
+    /// What is known of each joint's bias before the contact, for one scale of the biases.
+    bias: [Vec<BiasPrior>; BIAS_SCALES.len()],
     /// Log evidence of each joint's torques if nothing touched, for one scale of the biases.
     base: [Vec<f64>; BIAS_SCALES.len()],
     /// Half of the log of each joint's weights, summed.
@@ -91,6 +122,7 @@ impl Noise {
             seen: 0.0,
             second_difference: vec![0.0; dof],
             square: vec![0.0; dof],
+            bias: std::array::from_fn(|_| vec![BiasPrior::default(); dof]),
             base: std::array::from_fn(|_| vec![0.0; dof]),
             log_weights: vec![0.0; dof],
             weights: Vec::new(),
@@ -102,6 +134,15 @@ impl Noise {
         self.second_difference.fill(0.0);
         self.square.fill(0.0);
         self.inflation.fill(1.0);
+    }
+
+    /// Takes over what is known of the biases, which have been taken out of the torques.
+    pub(super) fn know_biases(&mut self, biases: &[JointBias]) {
+        for (scale, priors) in BIAS_SCALES.into_iter().zip(&mut self.bias) {
+            for (prior, bias) in priors.iter_mut().zip(biases) {
+                *prior = BiasPrior::new(scale, bias);
+            }
+        }
     }
 
     /// Learns from one sample's torques: white noise shows in their second differences.
@@ -150,8 +191,9 @@ impl Noise {
         obstacle.predict_newest(evidence, history, |predicted, joint, torque| {
             let weight = self.weigh(history.newest(), joint);
             // What the biases may be is no misfit.
-            let bias = BIAS_SCALES[evidence.bias_scale].powi(2);
-            sum += (torque.measured - predicted).powi(2) / (1.0 / weight + bias);
+            let bias = self.bias(evidence.bias_scale, joint);
+            let residual = torque.measured - predicted - bias.mean;
+            sum += residual * residual / (1.0 / weight + 1.0 / bias.precision);
             count += 1.0;
         });
         sum / f64::max(count, 1.0)
@@ -211,11 +253,13 @@ impl Noise {
                 log += w.ln();
             }
             self.log_weights[joint] = 0.5 * log;
-            for (scale, sigma) in BIAS_SCALES.into_iter().enumerate() {
-                let variance = sigma * sigma;
-                let gain = 1.0 / (weight + 1.0 / variance);
-                self.base[scale][joint] =
-                    0.5 * (log - second + gain * first * first - (1.0 + variance * weight).ln());
+            for (base, bias) in self.base.iter_mut().zip(&self.bias) {
+                let BiasPrior {
+                    mean, precision, ..
+                } = bias[joint];
+                let sum = first + precision * mean;
+                let explained = sum * sum / (weight + precision) - precision * mean * mean;
+                base[joint] = 0.5 * (log - second + explained - (1.0 + weight / precision).ln());
             }
         }
     }
@@ -224,15 +268,16 @@ impl Noise {
         BIAS_SCALES.len()
     }
 
-    /// Standard deviation of the biases of one scale, Nm.
-    pub(super) fn bias_scale(&self, scale: usize) -> f64 {
-        BIAS_SCALES[scale]
+    /// What is known of a joint's bias before the contact, for one scale.
+    pub(super) fn bias(&self, scale: usize, joint: usize) -> BiasPrior {
+        self.bias[scale][joint]
     }
 
     /// Log evidence of the torques of all joints beside a path, which feel nothing, and for those of the path the
     /// noise's log density but for the products with its inverse covariance.
     pub(super) fn base_beside(&self, scale: usize, path: &[usize]) -> f64 {
-        let all: f64 = self.base[scale].iter().sum();
+        let bias = self.bias[scale].iter().map(|bias| bias.log);
+        let all: f64 = self.base[scale].iter().sum::<f64>() + bias.sum::<f64>();
         let own = |&joint: &usize| self.log_weights[joint] - self.base[scale][joint];
         all + path.iter().map(own).sum::<f64>()
     }

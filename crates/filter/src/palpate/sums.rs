@@ -215,13 +215,17 @@ impl Sums {
         // What the priors make of the determinant, by Cholesky's factorisation row by row.
         let mut log_determinant = 0.0;
         for i in 0..count {
-            let deviation = match i < path.len() {
-                true => noise.bias_scale(scale),
-                false => tilt,
+            let (mean, precision) = match path.get(i) {
+                Some(&joint) => {
+                    let bias = noise.bias(scale, joint);
+                    (bias.mean, bias.precision)
+                }
+                None => (0.0, 1.0 / (tilt * tilt)),
             };
-            let precision = 1.0 / (deviation * deviation);
             let mut pivot = self.mixed[i][i] + precision;
             let mut row = self.rows[i];
+            row[COLUMNS - 1] += precision * mean;
+            gram[COLUMNS - 1][COLUMNS - 1] += precision * mean * mean;
             for j in 0..i {
                 let mut entry = self.mixed[i][j];
                 for k in 0..j {

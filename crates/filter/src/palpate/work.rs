@@ -20,8 +20,9 @@ use crate::step::Step;
 /// Draws for each particle at the start.
 const FIRST_DRAWS: usize = 8;
 /// Climbs from new places at each keyframe, the first of them from beside the best peaks, and the steps of each.
-const HOPS: usize = 8;
-const HOPS_FROM_PEAKS: usize = 5;
+const HOPS: usize = 16;
+const HOPS_FROM_PEAKS: usize = 6;
+const FAR_HOPS: usize = 8;
 const HOP_CLIMB: usize = 3;
 /// Share of the particles below which their effective number may fall.
 const RESAMPLE_BELOW: f64 = 0.5;
@@ -159,6 +160,12 @@ impl PalpateFilter {
     /// Beside a peak, or a particle, seen as a ball or a bar.
     fn hop_start(&self, index: usize, history: &History) -> Obstacle {
         let mut random = stream(self.seed, self.key, index, Purpose::Hop);
+        if index < FAR_HOPS && !self.peaks.is_empty() {
+            let among = self.peaks.len().min(4);
+            let peak = &self.peaks[random.random_range(0..among)];
+            return history.elsewhere(&peak.obstacle, &mut random);
+        }
+        let index = index - FAR_HOPS.min(index);
         match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
             Some(peak) => {
                 let own = peak.obstacle.likeness;
