@@ -20,6 +20,7 @@ mod remesh;
 mod scenario;
 mod scene;
 mod shape;
+pub mod solid;
 mod torque;
 mod trial;
 mod truth;

@@ -1,7 +1,9 @@
 //! What touches the arm, and what its sensors and the filter's mesh get wrong.
 
+use anyhow::{Context, Result};
 use nalgebra::Vector3;
 use palpate_model::Robot;
+use palpate_sim::solid::with_finer_body;
 use palpate_sim::{ObstacleKind, Scenario, coarsen};
 
 /// A variation of the one basic scenario: a sphere, white noise of 10 % of each joint's rms torque, and the filter's
@@ -15,6 +17,8 @@ pub struct Condition {
     change: fn(&mut Scenario),
     /// The filter's mesh is coarsened to triangles of this size, m.
     pub filter_mesh_edge: Option<f64>,
+    /// The true link has triangles so many times smaller than the filter's, made from the iiwa's solids.
+    finer_body: Option<f64>,
 }
 
 impl Condition {
@@ -24,6 +28,7 @@ impl Condition {
             title,
             change,
             filter_mesh_edge: None,
+            finer_body: None,
         }
     }
 
@@ -40,6 +45,18 @@ impl Condition {
         scenario
     }
 
+    /// The robot as it is, for contacts on a link.
+    ///
+    /// # Errors
+    /// If the condition asks for a body that is only known of the iiwa that ships with the project.
+    pub fn true_robot(&self, robot: &Robot, link: usize) -> Result<Robot> {
+        match self.finer_body {
+            None => Ok(robot.clone()),
+            Some(finer) => with_finer_body(robot, link, finer)
+                .context("only the shipped iiwa has a finer body"),
+        }
+    }
+
     /// The robot as the filter knows it.
     pub fn known_robot(&self, robot: &Robot) -> Robot {
         let mut known = robot.clone();
@@ -53,7 +70,7 @@ impl Condition {
 }
 
 /// Every condition.
-pub static CONDITIONS: [Condition; 12] = [
+pub static CONDITIONS: [Condition; 13] = [
     Condition::new("noise0", "sphere, no noise", |s| s.noise_fraction = 0.0),
     Condition::new("noise5", "sphere, 5 % noise", |s| s.noise_fraction = 0.05),
     Condition::new("noise10", "sphere of 30 mm radius, 10 % noise", |_| {}),
@@ -104,9 +121,18 @@ pub static CONDITIONS: [Condition; 12] = [
             |_| {},
         )
     },
+    Condition {
+        finer_body: Some(3.0),
+        ..Condition::new(
+            "finer",
+            "sphere, 10 % noise, the true link made anew from the solid behind the filter's mesh, with nine times its \
+             triangles",
+            |_| {},
+        )
+    },
     Condition::new(
-        "finer",
-        "sphere, 10 % noise, the true mesh rounder than the filter's, with four times its triangles",
+        "refined",
+        "sphere, 10 % noise, the true mesh the filter's with each triangle split into four and rounded",
         |s| s.refine_levels = 1,
     ),
     Condition::new(

@@ -60,7 +60,11 @@ pub static EXPERIMENTS: [Experiment; 16] = [
     error("edge", "A cube's edge (the paper's figure 6)", &["edge"]),
     error("bias", "A bias on every joint", &["bias"]),
     error("friction", "Friction", &["friction"]),
-    error("finer", "A true mesh finer than the filter's", &["finer"]),
+    error(
+        "finer",
+        "A true mesh finer than the filter's",
+        &["finer", "refined"],
+    ),
     ours("mesh15", "A coarse mesh in the filter", &["mesh15"]),
     ours("floor", "Noise on every joint", &["floor"]),
     ours("cylinder", "A pole", &["cylinder"]),

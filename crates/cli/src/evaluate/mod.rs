@@ -33,7 +33,7 @@ use campaign::Campaign;
 use estimator::Estimator;
 use experiment::{EXPERIMENTS, Experiment, View};
 use report::Report;
-use trial::{Cell, Setup};
+use trial::{Cell, Setup, TrueRobots};
 
 /// Measure how good the estimates are, on simulated contacts or on recorded ones
 ///
@@ -101,6 +101,7 @@ impl Evaluate {
             trials: self.trials as usize,
             secs: self.secs,
             particles: self.particles,
+            true_robots: TrueRobots::default(),
         };
         let links = self.link_numbers(&setup)?;
         let mut campaign = Campaign::new(setup, self.threads);

@@ -1,5 +1,8 @@
 //! One simulated trial: scenario, samples, filter, score.
 
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use anyhow::Result;
 use palpate_filter::Filter;
 use palpate_model::{JointSample, Robot};
@@ -24,7 +27,7 @@ pub struct Cell {
 /// How all trials are made.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// The true robot; but see [`Condition::known_robot`].
+    /// The robot; but see [`Condition::true_robot`] and [`Condition::known_robot`].
     pub robot: Robot,
     /// Seed of everything.
     pub seed: u64,
@@ -34,7 +37,12 @@ pub struct Setup {
     pub secs: f64,
     /// Number of particles; none for each estimator's own.
     pub particles: Option<usize>,
+    /// The robots as they are, by condition and number of the touched link, as far as they were needed.
+    pub true_robots: TrueRobots,
 }
+
+/// Robots shared by all trials.
+pub type TrueRobots = Arc<Mutex<BTreeMap<(&'static str, usize), Arc<Robot>>>>;
 
 /// A trial's score, or why there is none.
 pub type Outcome = Result<Score, String>;
@@ -42,9 +50,13 @@ pub type Outcome = Result<Score, String>;
 impl Setup {
     /// Name of the link of this number: the first one that so many joints move and that can be touched.
     pub fn link_name(&self, number: usize) -> Option<&str> {
-        let is_it = |link: &&palpate_model::Link| link.path.len() == number && link.mesh.is_some();
-        let link = self.robot.links.iter().find(is_it)?;
-        Some(&link.name)
+        self.link(number)
+            .map(|index| self.robot.links[index].name.as_str())
+    }
+
+    fn link(&self, number: usize) -> Option<usize> {
+        let is_it = |link: &palpate_model::Link| link.path.len() == number && link.mesh.is_some();
+        self.robot.links.iter().position(is_it)
     }
 
     /// Plays a trial and scores it. Its scene and motion follow from seed, link and number alone, so that every condition
@@ -75,11 +87,27 @@ impl Setup {
             anyhow::bail!("the robot has no link with a mesh behind just {link} movable joints");
         };
         let scenario = condition.scenario(name, self.scene_seed(link, number), self.secs);
-        match simulate(&self.robot, &scenario) {
+        let true_robot = self.true_robot(condition, link)?;
+        match simulate(&true_robot, &scenario) {
             Ok(trial) => Ok(Ok(trial)),
             Err(error @ SimError::NoContact { .. }) => Ok(Err(error.to_string())),
             Err(error) => Err(error.into()),
         }
+    }
+
+    /// The robot as it is in a condition, for contacts on the link of this number; made once.
+    fn true_robot(&self, condition: &Condition, link: usize) -> Result<Arc<Robot>> {
+        let mut made = self
+            .true_robots
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if let Some(robot) = made.get(&(condition.name, link)) {
+            return Ok(Arc::clone(robot));
+        }
+        let index = self.link(link).unwrap_or_default();
+        let robot = Arc::new(condition.true_robot(&self.robot, index)?);
+        made.insert((condition.name, link), Arc::clone(&robot));
+        Ok(robot)
     }
 
     /// Runs the filter over a trial and scores it; shows it to `see` after each sample.

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::inertia::Inertia;
-use crate::links::{HEIGHTS, SEAM_RADII};
+use palpate_sim::solid::{HEIGHTS, SEAM_RADII};
 
 /// A quarter turn, written out so that its sine is 1 to the last bit.
 const QUARTER: &str = "1.5707963267948966";
@@ -30,7 +30,7 @@ pub fn urdf(inertias: &[Inertia]) -> String {
     let body: String = links.chain(joints).collect();
     format!(
         r#"<?xml version="1.0"?>
-<!-- KUKA LBR iiwa 14 R820 from its published dimensions. Written by palpate-model's example generate_iiwa:
+<!-- KUKA LBR iiwa 14 R820 from its published dimensions. Written by palpate-sim's example generate_iiwa:
      change that, not this file. -->
 <robot name="iiwa14">
   <material name="silver">

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use nalgebra::{Matrix3, Point3, Vector3};
 use palpate_model::TriangleMesh;
 
-use crate::shape::Shape;
+use super::shape::Shape;
 
 /// Half the edge (m) of the cube about the origin that is searched.
 const REACH: f64 = 0.36;
@@ -22,13 +22,14 @@ const DISTANCE_WEIGHT: f64 = 20.0;
 
 type Cell = [i32; 3];
 
-/// Triangles of the surface of `shape`, from a grid of cubes of edge `step` (m); coordinates rounded to 1e-5 m.
-pub fn contour(shape: &Shape, step: f64) -> TriangleMesh {
+/// Triangles of the surface of `shape`, from a grid of cubes of edge `step` (m); coordinates rounded to the metre's
+/// `parts`.
+pub fn contour(shape: &Shape, step: f64, parts: f64) -> TriangleMesh {
     let mut net = Net::new(shape, step);
     for _ in 0..ROUNDS {
         net.relax(shape, step);
     }
-    let rounded = |vertex: &Vector3<f64>| Point3::from(vertex.map(|x| (x * 1e5).round() / 1e5));
+    let rounded = |vertex: &Vector3<f64>| Point3::from(vertex.map(|x| (x * parts).round() / parts));
     let vertices: Vec<_> = net.vertices.iter().map(rounded).collect();
     let split = |quad| split(shape, &vertices, quad);
     let triangles = net.quads.iter().flat_map(split).collect();

@@ -6,8 +6,12 @@ use std::fmt::Write;
 use nalgebra::Vector3;
 use palpate_model::TriangleMesh;
 
-use crate::{contour, inertia, links, shape::Shape, urdf};
+use palpate_sim::solid::{self, Shape};
 
+use crate::{inertia, urdf};
+
+/// Coordinates are written to so many parts of a metre.
+const PARTS: f64 = 1e5;
 /// A corner whose normals differ by more than this cosine (about 25°) lies on a rim.
 const RIM_COSINE: f64 = 0.9;
 
@@ -15,9 +19,9 @@ const RIM_COSINE: f64 = 0.9;
 pub fn files() -> Vec<(String, String)> {
     let mut files = Vec::new();
     let mut inertias = Vec::new();
-    for (index, (&cell, &mass)) in links::CELLS.iter().zip(&links::MASSES).enumerate() {
-        let solid = links::link(index);
-        let mesh = contour::contour(&solid, cell);
+    for (index, (&cell, &mass)) in solid::CELLS.iter().zip(&solid::MASSES).enumerate() {
+        let solid = solid::link(index);
+        let mesh = solid::contour(&solid, cell, PARTS);
         inertias.push(inertia::inertia(&mesh, mass));
         files.push((
             format!("meshes/link_{index}.obj"),

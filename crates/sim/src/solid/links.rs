@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use crate::shape::Shape;
+use super::shape::Shape;
 
 /// Heights (m) of joint k + 1 over joint k's frame, the last that of the flange over joint 7.
 pub const HEIGHTS: [f64; 8] = [0.1575, 0.2025, 0.2045, 0.2155, 0.1845, 0.2155, 0.081, 0.045];

@@ -1,13 +1,10 @@
 //! Writes the robot that ships with the project, `urdf/iiwa14.urdf` and `meshes/link_0.obj` to `link_7.obj`, into the
 //! folder given as argument, else into the repository.
 //!
-//! `cargo run --release -p palpate-model --example generate_iiwa`
+//! `cargo run --release -p palpate-sim --example generate_iiwa`
 
-mod contour;
 mod files;
 mod inertia;
-mod links;
-mod shape;
 mod urdf;
 
 use std::path::{Path, PathBuf};
