@@ -1,17 +1,4 @@
-//! The robot that ships with the project: its files are what the generator writes, and they describe an LBR iiwa 14.
-
-#[path = "../examples/generate_iiwa/contour.rs"]
-mod contour;
-#[path = "../examples/generate_iiwa/files.rs"]
-mod files;
-#[path = "../examples/generate_iiwa/inertia.rs"]
-mod inertia;
-#[path = "../examples/generate_iiwa/links.rs"]
-mod links;
-#[path = "../examples/generate_iiwa/shape.rs"]
-mod shape;
-#[path = "../examples/generate_iiwa/urdf.rs"]
-mod urdf;
+//! The robot that ships with the project: its files describe an LBR iiwa 14.
 
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
@@ -50,17 +37,6 @@ fn origin(robot: &Robot, position: [f64; 7], link: &str) -> Point3<f64> {
     kinematics.update(robot, &position);
     let link = robot.link_index(link).expect("the link is there");
     kinematics.root_from_link(link) * Point3::origin()
-}
-
-#[test]
-fn files_are_what_the_generator_writes() {
-    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let files = files::files();
-    assert_eq!(files.len(), 9);
-    for (path, text) in files {
-        let shipped = std::fs::read_to_string(repository.join(&path)).unwrap();
-        assert!(shipped == text, "{path} is not what generate_iiwa writes");
-    }
 }
 
 #[test]
