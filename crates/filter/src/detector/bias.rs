@@ -7,7 +7,7 @@ const CORRELATION_SECS: f64 = 0.01;
 /// Variance of the noise, at least, Nm².
 const LEAST_VARIANCE: f64 = 1e-4;
 /// How a bias may change while it cannot be learned: with the configuration, Nm/rad, and with time, Nm/√s.
-const CHANGE: f64 = 0.3;
+const CHANGE: f64 = 0.5;
 const DRIFT: f64 = 0.015;
 
 /// The bias of one joint's external torque.

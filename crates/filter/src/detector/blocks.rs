@@ -1,50 +1,43 @@
 //! The last fraction of a second: what it would teach is held back until no contact followed, and taken back otherwise.
 
 use super::bias::BiasFilter;
-use super::joint::{JointDetector, SCALES};
-use super::noise::Exposure;
+use super::joint::JointDetector;
+use super::motion::Motion;
+use super::noise::Span;
 
 /// Length of a block, s, and how many are held back.
 const BLOCK_SECS: f64 = 0.05;
 const HELD: usize = 8;
 
-/// A short time without contact.
-#[derive(Clone, Copy, Debug, Default)]
-struct Block {
-    begin_ns: i64,
-    secs: f64,
-    /// Squared quickness of the motion, times time.
-    motion: f64,
-}
-
-/// One joint's part in it.
+/// One joint's part in a short time without contact.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     /// The bias when it began.
     bias: BiasFilter,
-    /// Squares of the smoothed residuals, times time.
-    squares: [f64; SCALES.len()],
+    span: Span,
 }
 
-/// The blocks held back, the newest last in `order`.
+/// The blocks held back, from the oldest on.
 #[derive(Clone, Debug)]
 pub(super) struct Blocks {
-    blocks: [Block; HELD],
+    /// Stamp with which each begins, ns.
+    begin_ns: [i64; HELD],
     /// Parts by joint.
     parts: Vec<[Option<Part>; HELD]>,
     oldest: usize,
     count: usize,
-    exposure: Exposure,
+    /// Length of the newest so far, s.
+    secs: f64,
 }
 
 impl Blocks {
     pub(super) fn new(dof: usize) -> Self {
         Self {
-            blocks: [Block::default(); HELD],
+            begin_ns: [0; HELD],
             parts: vec![[None; HELD]; dof],
             oldest: 0,
             count: 0,
-            exposure: Exposure::default(),
+            secs: 0.0,
         }
     }
 
@@ -53,72 +46,48 @@ impl Blocks {
         self.count = 0;
     }
 
-    /// Forgets also what was learned.
-    pub(super) fn forget(&mut self) {
-        self.exposure = Exposure::default();
-    }
-
     /// Takes a sample without contact in, and teaches the joints what is old enough.
     pub(super) fn take(
         &mut self,
         stamp_ns: i64,
         step_secs: f64,
-        x2: f64,
+        motion: &Motion,
         joints: &mut [JointDetector],
         motion_std: f64,
     ) {
-        let newest = (self.oldest + self.count + HELD - 1) % HELD;
-        let is_open = self.count > 0 && self.blocks[newest].secs < BLOCK_SECS;
-        let place = match is_open {
-            true => newest,
-            false => self.open(stamp_ns, joints, motion_std),
-        };
-        let block = &mut self.blocks[place];
-        block.secs += step_secs;
-        block.motion += step_secs * x2;
-        for (parts, joint) in self.parts.iter_mut().zip(joints) {
-            if let Some(part) = &mut parts[place] {
-                for (sum, smoothed) in part.squares.iter_mut().zip(joint.smoothed) {
-                    *sum += step_secs * smoothed * smoothed;
-                }
+        if self.count == 0 || self.secs >= BLOCK_SECS {
+            self.open(stamp_ns, joints, motion_std);
+        }
+        self.secs += step_secs;
+        let newest = (self.oldest + self.count - 1) % HELD;
+        let x2 = motion.quickness().powi(2);
+        for ((parts, joint), turning) in self.parts.iter_mut().zip(joints).zip(motion.turning()) {
+            if let Some(part) = &mut parts[newest] {
+                (part.span).add(step_secs, x2, *turning, joint.smoothed);
             }
         }
     }
 
-    fn open(&mut self, stamp_ns: i64, joints: &mut [JointDetector], motion_std: f64) -> usize {
+    fn open(&mut self, stamp_ns: i64, joints: &mut [JointDetector], motion_std: f64) {
         if self.count == HELD {
-            self.teach(joints, motion_std);
+            for (parts, joint) in self.parts.iter().zip(&mut *joints) {
+                if let Some(part) = &parts[self.oldest] {
+                    joint.learn_noise(&part.span, motion_std);
+                }
+            }
+            self.oldest = (self.oldest + 1) % HELD;
+            self.count -= 1;
         }
         let place = (self.oldest + self.count) % HELD;
         self.count += 1;
-        self.blocks[place] = Block {
-            begin_ns: stamp_ns,
-            ..Block::default()
-        };
+        self.secs = 0.0;
+        self.begin_ns[place] = stamp_ns;
         for (parts, joint) in self.parts.iter_mut().zip(joints) {
             parts[place] = Some(Part {
                 bias: joint.bias,
-                squares: [0.0; SCALES.len()],
+                span: Span::default(),
             });
         }
-        place
-    }
-
-    /// Teaches the oldest block to the joints.
-    fn teach(&mut self, joints: &mut [JointDetector], motion_std: f64) {
-        let Block { secs, motion, .. } = self.blocks[self.oldest];
-        let x2 = motion / secs;
-        self.exposure.take(secs, x2);
-        for (parts, joint) in self.parts.iter().zip(joints) {
-            let Some(part) = parts[self.oldest] else {
-                continue;
-            };
-            for (spread, squares) in joint.spread.iter_mut().zip(part.squares) {
-                spread.take(squares / secs, secs, x2, &self.exposure, motion_std);
-            }
-        }
-        self.oldest = (self.oldest + 1) % HELD;
-        self.count -= 1;
     }
 
     /// Puts the biases back to what they were before a contact that began at `since_ns`.
@@ -126,7 +95,7 @@ impl Blocks {
         let mut newest_first = (0..self.count)
             .rev()
             .map(|index| (self.oldest + index) % HELD);
-        let before = newest_first.find(|&place| self.blocks[place].begin_ns <= since_ns);
+        let before = newest_first.find(|&place| self.begin_ns[place] <= since_ns);
         let place = before.unwrap_or(self.oldest);
         if self.count > 0 {
             for (parts, joint) in self.parts.iter().zip(joints) {

@@ -1,11 +1,12 @@
 //! One joint's control charts.
 
 use super::bias::{BiasFilter, Forgetting};
-use super::noise::{Spread, White};
+use super::noise::{Exposure, Span, Spread, White};
 use super::{DetectorParameters, JointBias};
 
 /// Time constants of the charts, s.
-pub(super) const SCALES: [f64; 3] = [0.004, 0.02, 0.08];
+pub(super) const CHARTS: usize = 3;
+pub(super) const SCALES: [f64; CHARTS] = [0.004, 0.02, 0.08];
 /// The chart that says whether a contact ended.
 const RELEASE: usize = 1;
 /// A sample counts for at most so many standard deviations: one wrong sample is no contact.
@@ -16,15 +17,15 @@ const CALM: f64 = 2.0;
 /// What the charts of all joints share: gains of this step, and the share of white noise's variance that each keeps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Charts {
-    gain: [f64; SCALES.len()],
-    share: [f64; SCALES.len()],
+    gain: [f64; CHARTS],
+    share: [f64; CHARTS],
 }
 
 impl Charts {
     /// Begins anew with the next sample.
     pub(super) fn begin(&mut self) {
-        self.gain = [1.0; SCALES.len()];
-        self.share = [1.0; SCALES.len()];
+        self.gain = [1.0; CHARTS];
+        self.share = [1.0; CHARTS];
     }
 
     pub(super) fn advance(&mut self, step_secs: f64) {
@@ -41,8 +42,13 @@ impl Charts {
 pub(super) struct JointDetector {
     pub(super) bias: BiasFilter,
     white: White,
-    pub(super) spread: [Spread; SCALES.len()],
-    pub(super) smoothed: [f64; SCALES.len()],
+    pub(super) spread: [Spread; CHARTS],
+    pub(super) exposure: Exposure,
+    /// What was seen during the present contact.
+    doubt: Span,
+    /// What each chart reads where a contact begins, Nm.
+    limit: [f64; CHARTS],
+    pub(super) smoothed: [f64; CHARTS],
     /// Standard deviation of a sample's residual, Nm.
     sample_std: f64,
     residual: f64,
@@ -63,8 +69,11 @@ impl JointDetector {
             bias: BiasFilter::new(parameters),
             sample_std: (white.variance() + parameters.bias_std.powi(2)).sqrt(),
             white,
-            spread: [Spread::new(parameters.motion_std); SCALES.len()],
-            smoothed: [0.0; SCALES.len()],
+            spread: [Spread::new(parameters.motion_std); CHARTS],
+            exposure: Exposure::default(),
+            doubt: Span::default(),
+            limit: [0.0; CHARTS],
+            smoothed: [0.0; CHARTS],
             residual: 0.0,
             ratio: 0.0,
             release_ratio: 0.0,
@@ -95,17 +104,20 @@ impl JointDetector {
         }
     }
 
-    /// Weighs the charts against their thresholds.
-    pub(super) fn weigh(&mut self, stamp_ns: i64, charts: &Charts, scene: &Weighing) {
+    /// Weighs the charts against their thresholds, while the joint turns by `turning`.
+    pub(super) fn weigh(&mut self, stamp_ns: i64, turning: f64, charts: &Charts, scene: &Weighing) {
         let bias = self.bias.variance + scene.frozen_variance;
         let white = self.white.variance();
-        self.sample_std = (white.max(self.spread[0].at(scene.x2)) + bias).sqrt();
+        let noise = white.max(self.spread[0].at(scene.x2, turning));
+        self.sample_std = (noise + bias).sqrt();
         self.ratio = 0.0;
-        for scale in 0..SCALES.len() {
-            let noise = (white * charts.share[scale]).max(self.spread[scale].at(scene.x2));
+        for scale in 0..CHARTS {
+            let noise = (white * charts.share[scale]).max(self.spread[scale].at(scene.x2, turning));
             let std = (noise + bias).sqrt();
             let smoothed = self.smoothed[scale].abs();
-            let ratio = smoothed / (scene.threshold * std).max(self.least_torque);
+            let limit = (scene.threshold * std).max(self.least_torque);
+            let ratio = smoothed / limit;
+            self.limit[scale] = limit;
             self.ratio = self.ratio.max(ratio);
             if scale == RELEASE {
                 self.release_ratio = ratio;
@@ -118,10 +130,32 @@ impl JointDetector {
         }
     }
 
-    /// Learns the bias from the last sample; `trust` is the share of the full gain.
-    pub(super) fn learn_bias(&mut self, trust: f64, forgetting: Forgetting) {
+    /// Learns the bias from the last sample; `trust` is the share of the full gain. A turn teaches nothing until it is over.
+    pub(super) fn learn_bias(&mut self, trust: f64, turning: f64, forgetting: Forgetting) {
         let white = self.white.variance();
+        let trust = trust * (1.0 - turning);
         self.bias.learn(self.residual, white, trust, forgetting);
+    }
+
+    /// Notes what a contact looks like, for it may turn out to be none. No more counts than what begins a contact.
+    pub(super) fn doubt(&mut self, step_secs: f64, x2: f64, turning: f64) {
+        let charts = std::array::from_fn(|scale| self.smoothed[scale].abs().min(self.limit[scale]));
+        self.doubt.add(step_secs, x2, turning, charts);
+    }
+
+    /// Learns from what was noted and forgets it; not if it was a contact without doubt, or `off_turns` and the noise is
+    /// known.
+    pub(super) fn settle(&mut self, is_doubtful: bool, off_turns: bool, motion_std: f64) {
+        let span = std::mem::take(&mut self.doubt);
+        let is_known = self.exposure.is_long();
+        if is_doubtful && !(is_known && off_turns) {
+            span.teach(&mut self.exposure, &mut self.spread, motion_std, is_known);
+        }
+    }
+
+    /// Learns the noise from a span without contact.
+    pub(super) fn learn_noise(&mut self, span: &Span, motion_std: f64) {
+        span.teach(&mut self.exposure, &mut self.spread, motion_std, false);
     }
 
     /// Sets the bias, as after a tare.
@@ -140,9 +174,9 @@ impl JointDetector {
 
     /// The bias, with an uncertainty that includes all that does not average out over the slowest chart.
     pub(super) fn bias(&self, charts: &Charts, scene: &Weighing) -> JointBias {
-        let slowest = SCALES.len() - 1;
+        let slowest = CHARTS - 1;
         let white = self.white.variance() * charts.share[slowest];
-        let slow = (self.spread[slowest].at(scene.x2) - white).max(0.0);
+        let slow = (self.spread[slowest].at(scene.x2, 0.0) - white).max(0.0);
         JointBias {
             mean: self.bias.mean,
             std: (self.bias.variance + scene.frozen_variance + slow).sqrt(),

@@ -28,6 +28,11 @@ pub use parameters::DetectorParameters;
 
 /// After so long without sample the smoothed residuals begin anew, s.
 const GAP_SECS: f64 = 0.5;
+/// A short contact that hardly stood out may have been none, and teaches: noise while little is known of it, else what
+/// happened on joints that turned back, if no other one felt it. In s, thresholds, and how much a joint turned.
+const DOUBTFUL_SECS: f64 = 3.0;
+const DOUBTFUL_RATIO: f64 = 1.5;
+const DOUBTFUL_TURN: f64 = 0.3;
 /// Time over which the time between samples is learned, in samples.
 const PERIOD_SAMPLES: f64 = 50.0;
 /// A contact within this time of the stream's begin was not seen to begin, s.
@@ -47,6 +52,9 @@ pub struct Detector {
     last_ns: Option<i64>,
     period_secs: f64,
     weighing: Weighing,
+    /// Whether the present contact stands out well, and whether a joint feels it that does not turn.
+    stands_out: bool,
+    is_off_turns: bool,
     quiet_secs: f64,
     /// Where the robot was when the present contact began.
     contact_position: Vec<f64>,
@@ -79,6 +87,8 @@ impl Detector {
             last_ns: None,
             period_secs: 0.01,
             weighing: Weighing::default(),
+            stands_out: false,
+            is_off_turns: false,
             quiet_secs: 0.0,
             contact_position: vec![0.0; dof],
             moved: (0..dof).map(moved).collect(),
@@ -146,9 +156,12 @@ impl Detector {
         let step_secs = self.advance(stamp_ns, position);
         self.weighing = self.weighing_at(stamp_ns, position);
         let weighing = self.weighing;
-        for (joint, &torque) in self.joints.iter_mut().zip(external_torque) {
+        let turning = self.motion.turning();
+        for ((joint, &torque), &turning) in
+            (self.joints.iter_mut().zip(external_torque)).zip(turning)
+        {
             joint.look(torque, step_secs, &self.charts);
-            joint.weigh(stamp_ns, &self.charts, &weighing);
+            joint.weigh(stamp_ns, turning, &self.charts, &weighing);
         }
         self.detection.event = None;
         match self.detection.in_contact {
@@ -180,7 +193,7 @@ impl Detector {
     }
 
     fn weighing_at(&self, stamp_ns: i64, position: &[f64]) -> Weighing {
-        let looks = 3600.0 / self.period_secs * (self.joints.len() * joint::SCALES.len()) as f64;
+        let looks = 3600.0 / self.period_secs * (self.joints.len() * joint::CHARTS) as f64;
         let frozen_variance = self.detection.since_ns.map_or(0.0, |since_ns| {
             let secs = secs_between(since_ns, stamp_ns).max(0.0);
             bias::frozen_variance(distance(position, &self.contact_position), secs)
@@ -219,10 +232,10 @@ impl Detector {
         // What may be a contact's begin counts less (Tukey's biweight).
         let trust = (1.0 - ratio * ratio).powi(2);
         let forgetting = Forgetting::new(&self.parameters, step_secs, self.motion.speed());
-        let (x2, motion_std) = (self.weighing.x2, self.parameters.motion_std);
-        (self.blocks).take(stamp_ns, step_secs, x2, &mut self.joints, motion_std);
-        for joint in &mut self.joints {
-            joint.learn_bias(trust, forgetting);
+        let (motion, motion_std) = (&self.motion, self.parameters.motion_std);
+        (self.blocks).take(stamp_ns, step_secs, motion, &mut self.joints, motion_std);
+        for (joint, turning) in self.joints.iter_mut().zip(motion.turning()) {
+            joint.learn_bias(trust, *turning, forgetting);
         }
     }
 
@@ -230,6 +243,8 @@ impl Detector {
         self.blocks.restore(since_ns, &mut self.joints);
         self.contact_position.copy_from_slice(position);
         self.quiet_secs = 0.0;
+        self.stands_out = false;
+        self.is_off_turns = false;
         self.detection.in_contact = true;
         self.detection.since_ns = Some(since_ns);
         self.detection.first_link = None;
@@ -242,6 +257,12 @@ impl Detector {
     }
 
     fn watch_for_end(&mut self, stamp_ns: i64, step_secs: f64) {
+        let x2 = self.weighing.x2;
+        for (joint, turning) in self.joints.iter_mut().zip(self.motion.turning()) {
+            joint.doubt(step_secs, x2, *turning);
+            self.stands_out |= joint.ratio >= DOUBTFUL_RATIO;
+            self.is_off_turns |= joint.ratio >= 1.0 && *turning < DOUBTFUL_TURN;
+        }
         let share = self.parameters.release_share;
         let is_quiet = self.joints.iter().all(|joint| joint.release_ratio < share);
         self.quiet_secs = if is_quiet {
@@ -256,6 +277,8 @@ impl Detector {
 
     fn end(&mut self, stamp_ns: i64) {
         let quiet_ns = (self.quiet_secs * 1e9) as i64;
+        let since_ns = self.detection.since_ns.unwrap_or(stamp_ns);
+        let is_doubtful = !self.stands_out && secs_between(since_ns, stamp_ns) < DOUBTFUL_SECS;
         self.detection.in_contact = false;
         self.detection.since_ns = None;
         self.detection.first_link = None;
@@ -270,6 +293,7 @@ impl Detector {
         self.blocks.clear();
         for joint in &mut self.joints {
             joint.thaw(self.weighing.frozen_variance);
+            joint.settle(is_doubtful, self.is_off_turns, self.parameters.motion_std);
         }
     }
 
@@ -315,7 +339,6 @@ impl Detector {
         self.joints.fill(JointDetector::new(&self.parameters));
         self.charts.begin();
         self.blocks.clear();
-        self.blocks.forget();
         self.last_ns = None;
         self.quiet_secs = 0.0;
         self.bias.fill(JointBias::default());

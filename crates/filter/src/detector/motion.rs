@@ -5,42 +5,93 @@ const SMOOTHING_SECS: f64 = 0.02;
 /// How long motion goes on to count after it ended: what it left wrong is learned meanwhile, s.
 const LINGER_SECS: f64 = 0.3;
 /// Speed that counts as half of a fast motion, rad/s.
-const HALF_SPEED: f64 = 0.3;
+const HALF_SPEED: f64 = 1.0;
+/// Time constant of the smoothing of joint accelerations, s.
+const ACCELERATION_SECS: f64 = 0.05;
+/// A joint turns this long before and after its speed changes its sign, s, if it moved at least this fast, rad/s, within
+/// this time, s.
+const TURN_SECS: f64 = 0.3;
+const MOVING_SPEED: f64 = 0.03;
+const MOVED_SECS: f64 = 0.5;
 
-/// The joints' motion.
+/// One joint's motion, in rad/s and rad/s².
+#[derive(Clone, Copy, Debug, Default)]
+struct JointMotion {
+    position: f64,
+    velocity: f64,
+    acceleration: f64,
+    /// Its speed; it falls slowly.
+    peak: f64,
+    /// How lately its speed changed its sign, 0 to 1.
+    turned: f64,
+}
+
+impl JointMotion {
+    fn update(&mut self, position: f64, step_secs: f64) {
+        let before = self.velocity;
+        let follow = |secs: f64| 1.0 - (-step_secs / secs).exp();
+        let velocity = (position - self.position) / step_secs;
+        self.position = position;
+        self.velocity += follow(SMOOTHING_SECS) * (velocity - before);
+        let acceleration = (self.velocity - before) / step_secs;
+        self.acceleration += follow(ACCELERATION_SECS) * (acceleration - self.acceleration);
+        let lingering = self.peak * (-step_secs / MOVED_SECS).exp();
+        self.peak = self.velocity.abs().max(lingering);
+        self.turned = match before * self.velocity < 0.0 {
+            true => 1.0,
+            false => self.turned * (-step_secs / TURN_SECS).exp(),
+        };
+    }
+
+    fn turning(&self) -> f64 {
+        let slows = self.velocity * self.acceleration < 0.0;
+        let will_turn = match slows {
+            true => (-(self.velocity / (self.acceleration * TURN_SECS)).powi(2)).exp(),
+            false => 0.0,
+        };
+        let has_moved = (self.peak / MOVING_SPEED).min(1.0).powi(2);
+        has_moved * will_turn.max(self.turned)
+    }
+}
+
+/// The motion of all joints.
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
-    last: Vec<f64>,
-    velocity: Vec<f64>,
+    joints: Vec<JointMotion>,
+    turning: Vec<f64>,
     speed: f64,
 }
 
 impl Motion {
     pub(super) fn new(dof: usize) -> Self {
         Self {
-            last: vec![0.0; dof],
-            velocity: vec![0.0; dof],
+            joints: vec![JointMotion::default(); dof],
+            turning: vec![0.0; dof],
             speed: 0.0,
         }
     }
 
     /// Begins at a position, at rest.
     pub(super) fn begin(&mut self, position: &[f64]) {
-        self.last.copy_from_slice(position);
-        self.velocity.fill(0.0);
+        for (joint, &position) in self.joints.iter_mut().zip(position) {
+            *joint = JointMotion {
+                position,
+                ..JointMotion::default()
+            };
+        }
+        self.turning.fill(0.0);
         self.speed = 0.0;
     }
 
     /// Takes a position in.
     pub(super) fn update(&mut self, position: &[f64], step_secs: f64) {
-        let gain = 1.0 - (-step_secs / SMOOTHING_SECS).exp();
         let mut squares = 0.0;
-        for ((last, velocity), position) in
-            (self.last.iter_mut().zip(&mut self.velocity)).zip(position)
-        {
-            *velocity += gain * ((position - *last) / step_secs - *velocity);
-            *last = *position;
-            squares += *velocity * *velocity;
+        for (joint, &position) in self.joints.iter_mut().zip(position) {
+            joint.update(position, step_secs);
+            squares += joint.velocity * joint.velocity;
+        }
+        for (turning, joint) in self.turning.iter_mut().zip(&self.joints) {
+            *turning = joint.turning();
         }
         let lingering = self.speed * (-step_secs / LINGER_SECS).exp();
         self.speed = squares.sqrt().max(lingering);
@@ -54,5 +105,10 @@ impl Motion {
     /// How fast the motion is: 0 at rest, towards 1 in fast motion.
     pub(super) fn quickness(&self) -> f64 {
         self.speed / (self.speed + HALF_SPEED)
+    }
+
+    /// Whether each joint turns back or stops, 0 to 1: there friction jumps, and what is known of it is wrong.
+    pub(super) fn turning(&self) -> &[f64] {
+        &self.turning
     }
 }

@@ -10,7 +10,7 @@ use crate::ParameterError;
 pub struct DetectorParameters {
     /// False alarms an hour that the noise may cause, at most. Default 0.1.
     pub false_alarms_per_hour: f64,
-    /// Torques below this are no contact, however little noise there is, Nm (N for a prismatic joint). Default 0.25.
+    /// Torques below this are no contact, however little noise there is, Nm (N for a prismatic joint). Default 0.15.
     pub least_torque: f64,
     /// A contact begins when the torques speak for it this long without a break, s. Default 0.002.
     pub min_secs: f64,
@@ -33,7 +33,7 @@ impl Default for DetectorParameters {
     fn default() -> Self {
         Self {
             false_alarms_per_hour: 0.1,
-            least_torque: 0.25,
+            least_torque: 0.15,
             min_secs: 0.002,
             release_share: 0.6,
             release_secs: 0.2,
