@@ -18,7 +18,7 @@ const TURNING_SECS: f64 = 0.1;
 /// What motion gets wrong is not Gaussian: factor on its variance.
 const NOT_GAUSSIAN: f64 = 2.0;
 /// Time from which on the noise counts as known, s.
-const KNOWN_SECS: f64 = 5.0;
+const KNOWN_SECS: f64 = 3.0;
 /// Time over which residuals are remembered, s.
 const MEMORY_SECS: f64 = 60.0;
 /// A second difference counts for at most so many standard deviations.
@@ -84,6 +84,8 @@ pub(super) struct Spread {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Exposure {
     sums: [f64; 3],
+    /// Time without weight, s.
+    secs: f64,
 }
 
 /// Some time without contact, with how one joint moved and what its charts read.
@@ -151,12 +153,13 @@ struct Lesson {
 }
 
 impl Exposure {
-    /// Whether the noise at rest is well known.
+    /// Whether the noise is known.
     pub(super) fn is_long(&self) -> bool {
-        self.sums[0] > KNOWN_SECS
+        self.secs > KNOWN_SECS
     }
 
     fn take(&mut self, lesson: &Lesson) {
+        self.secs += lesson.secs;
         let regressors = [1.0, lesson.x2, lesson.turning];
         for ((sum, weight), regressor) in self.sums.iter_mut().zip(lesson.weights).zip(regressors) {
             *sum = lesson.kept * *sum + lesson.secs * weight * regressor;
