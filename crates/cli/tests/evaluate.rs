@@ -213,3 +213,45 @@ fn wrong_words_are_refused_with_what_there_is() {
     }
     assert!(done(&["--list"]).contains("calibration"));
 }
+
+#[test]
+fn detection_tells_false_alarms_and_what_became_of_pushes() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let arguments = [
+        "detection",
+        "--trials",
+        "2",
+        "--links",
+        "6",
+        "--free-secs",
+        "12",
+        "--out",
+        out,
+    ];
+    let said = done(&arguments);
+    assert!(
+        said.contains("False alarms") && said.contains("operating"),
+        "{said}"
+    );
+    let free = rows(&read(&folder, "free.csv"));
+    // Two rates, seven situations, two sources.
+    assert_eq!(free.len(), 28);
+    let is_calm = |row: &&Vec<(String, String)>| row[1].1 == "rest" || row[1].1 == "slow";
+    for row in free.iter().filter(is_calm) {
+        assert_eq!(number(row, "false_alarms"), 0.0, "{row:?}");
+        assert!(number(row, "secs") > 8.0, "{row:?}");
+    }
+    let pushes = rows(&read(&folder, "pushes.csv"));
+    assert_eq!(pushes.len(), 2 * 5 * 2 * 5);
+    for row in &pushes {
+        assert_eq!((number(row, "link"), number(row, "pushes")), (6.0, 2.0));
+        if row[1].1 == "slow" && row[2].1 == "momentum observer" && number(row, "force") >= 10.0 {
+            assert_eq!(number(row, "noticed"), 2.0, "{row:?}");
+            assert!(number(row, "most_delay_secs") < 0.1, "{row:?}");
+        }
+    }
+    let report = read(&folder, "report.md");
+    assert!(report.contains("false_alarms_per_hour: 0.1") && report.contains("](roc.svg)"));
+    assert!(read(&folder, "detection.svg").starts_with("<svg"));
+}

@@ -23,14 +23,14 @@ use crate::simulate::START_NS;
 use crate::{Unreadable, Usage, progress, read_text, table as terminal};
 
 /// A recorded trial.
-struct Recorded {
+pub struct Recorded {
     /// Folder of truth.csv and bag/, below the folder of all trials.
-    name: String,
+    pub name: String,
     folder: PathBuf,
     /// Name of the folder around: what kind of trials these are.
     set: String,
     /// Number of the touched link.
-    link: usize,
+    pub link: usize,
 }
 
 /// Scores every method asked for (palpate and the paper's curvature model by default) on the trials below `--bags`.
@@ -82,7 +82,7 @@ pub fn run(evaluate: &Evaluate) -> Result<()> {
 }
 
 /// Every trial below a folder, by name.
-fn find(root: &Path) -> Result<Vec<Recorded>> {
+pub fn find(root: &Path) -> Result<Vec<Recorded>> {
     let mut found = Vec::new();
     let mut folders = vec![root.to_owned()];
     while let Some(folder) = folders.pop() {
@@ -122,6 +122,16 @@ fn recorded(root: &Path, folder: PathBuf) -> Result<Recorded> {
     })
 }
 
+/// A trial's samples, and the truth while it is in contact.
+pub fn load(robot: &Robot, trial: &Recorded) -> Result<(Vec<JointSample>, Vec<Known>)> {
+    let bag = Bag::open(&trial.folder.join("bag"))?;
+    let tolerance_ns = (InputSettings::default().pairing_tolerance_secs * 1e9).round() as i64;
+    let samples = read_samples(&bag, robot, &TopicChoice::default(), tolerance_ns)?.samples;
+    let rows = TruthRow::read_all(&read_text(&trial.folder.join("truth.csv"))?)?;
+    let truth = known(robot, &rows, &samples)?;
+    Ok((samples, truth))
+}
+
 fn score_one(
     robot: &Robot,
     trial: &Recorded,
@@ -129,11 +139,7 @@ fn score_one(
     particles: Option<usize>,
     seed: u64,
 ) -> Result<Score> {
-    let bag = Bag::open(&trial.folder.join("bag"))?;
-    let tolerance_ns = (InputSettings::default().pairing_tolerance_secs * 1e9).round() as i64;
-    let samples = read_samples(&bag, robot, &TopicChoice::default(), tolerance_ns)?.samples;
-    let rows = TruthRow::read_all(&read_text(&trial.folder.join("truth.csv"))?)?;
-    let truth = known(robot, &rows, &samples)?;
+    let (samples, truth) = load(robot, trial)?;
     // The seed itself, so that `palpate replay` gives the same estimates.
     let mut filter = Filter::new(robot, &estimator.parameters(particles), seed)?;
     score(&mut filter, robot.dof(), &samples, &truth, |_, _| {})

@@ -4,6 +4,7 @@ mod bags;
 mod campaign;
 mod condition;
 mod csv;
+mod detection;
 mod estimator;
 mod experiment;
 mod machine;
@@ -38,13 +39,13 @@ use trial::{Cell, Setup, TrueRobots};
 /// Measure how good the estimates are, on simulated contacts or on recorded ones
 ///
 /// Without EXPERIMENT every experiment of --list is run; `targets` alone prints the table of measured values beside those
-/// to reach, and `bags` scores a folder of recorded trials. Trials last 10 s at 100 Hz, in contact from the first sample.
+/// to reach, and `bags` scores a folder of recorded trials, and `detection` tells how surely and soon contacts are noticed. Trials last 10 s at 100 Hz, in contact from the first sample.
 /// Errors are position errors, the median over the last second. No trial runs twice, though several experiments use it;
 /// scenes and motions follow from seed, link and number of the trial, so that all conditions and methods are tried on the
 /// same ones. Results do not depend on the number of threads.
 #[derive(Args)]
 pub struct Evaluate {
-    /// What to measure: names from --list, or `bags`
+    /// What to measure: names from --list, `bags` or `detection`
     #[arg(value_name = "EXPERIMENT")]
     experiments: Vec<String>,
     /// List the experiments and their conditions
@@ -74,7 +75,10 @@ pub struct Evaluate {
     /// Folder for report.md, CSV and plots; made if it is not there, earlier results in it are replaced [default: none]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// For `bags`: folder of trials, each with truth.csv beside bag/, at any depth
+    /// For `detection`: length of each motion without contact, s
+    #[arg(long, value_name = "SECS", default_value_t = 3600.0)]
+    free_secs: f64,
+    /// For `bags`, and if it is given for `detection`: folder of trials, each with truth.csv beside bag/, at any depth
     #[arg(long, value_name = "DIR")]
     bags: Option<PathBuf>,
     /// The robot [default: the iiwa that ships]
@@ -94,6 +98,9 @@ impl Evaluate {
         if self.experiments.iter().any(|name| name == "bags") {
             return bags::run(self);
         }
+        if self.experiments.iter().any(|name| name == "detection") {
+            return detection::run(self);
+        }
         let experiments = self.chosen()?;
         let setup = Setup {
             robot: self.load_robot()?,
@@ -103,7 +110,7 @@ impl Evaluate {
             particles: self.particles,
             true_robots: TrueRobots::default(),
         };
-        let links = self.link_numbers(&setup)?;
+        let links = self.link_numbers(&setup.robot)?;
         let mut campaign = Campaign::new(setup, self.threads);
         let mut report = Report::new(self.out.clone())?;
         let start = Instant::now();
@@ -152,7 +159,7 @@ impl Evaluate {
             known.ok_or_else(|| {
                 let names: Vec<_> = EXPERIMENTS.iter().map(|e| e.name).collect();
                 Usage(format!(
-                    "there is no experiment {name}; there are {} and bags",
+                    "there is no experiment {name}; there are {}, bags and detection",
                     names.join(", ")
                 ))
             })
@@ -193,10 +200,12 @@ impl Evaluate {
     }
 
     /// Numbers of the links to touch, all of which exist.
-    fn link_numbers(&self, setup: &Setup) -> Result<Vec<usize>> {
-        let all: Vec<_> = (1..=setup.robot.dof())
-            .filter(|number| setup.link_name(*number).is_some())
-            .collect();
+    fn link_numbers(&self, robot: &Robot) -> Result<Vec<usize>> {
+        let has_mesh = |number: &usize| {
+            let mut links = robot.links.iter();
+            links.any(|link| link.path.len() == *number && link.mesh.is_some())
+        };
+        let all: Vec<_> = (1..=robot.dof()).filter(has_mesh).collect();
         if self.links.is_empty() {
             return Ok(all);
         }
@@ -272,7 +281,7 @@ fn list() -> String {
     {
         text += &format!("  {name:12} {title} [{}]\n", conditions.join(", "));
     }
-    text += "  bags         Recorded trials in the folder --bags\n\nConditions:\n";
+    text += "  bags         Recorded trials in the folder --bags\n  detection    Pushes noticed, false alarms, receiver operating curves\n\nConditions:\n";
     for condition in &condition::CONDITIONS {
         text += &format!("  {:12} {}\n", condition.name, condition.title);
     }

@@ -11,20 +11,21 @@ use super::estimator::Estimator;
 use super::experiment::{Experiment, View};
 use super::trial::Cell;
 use crate::picture::svg::{Anchor, Svg};
+pub use panel::{Panel, Scale};
 
 /// Width of a plot, px.
-const WIDTH: f64 = 1000.0;
+pub const WIDTH: f64 = 1000.0;
 /// Left and right edge of its panels, px.
-const LEFT: f64 = 84.0;
-const RIGHT: f64 = 970.0;
+pub const LEFT: f64 = 84.0;
+pub const RIGHT: f64 = 970.0;
 /// Lower edge of the title, px.
-const TOP: f64 = 66.0;
+pub const TOP: f64 = 66.0;
 
 /// Height of what is above a panel and of what is below it, px.
-const HEAD: f64 = 48.0;
-const FOOT: f64 = 56.0;
+pub const HEAD: f64 = 48.0;
+pub const FOOT: f64 = 56.0;
 
-const STYLE: &str = "text{font-family:'Helvetica Neue',Helvetica,Arial,sans-serif;fill:#24292f}\
+pub const STYLE: &str = "text{font-family:'Helvetica Neue',Helvetica,Arial,sans-serif;fill:#24292f}\
 .title{font-size:20px;font-weight:600}.subtitle{font-size:14px;fill:#57606a}\
 .head{font-size:15px;font-weight:600}.label{font-size:13px}.small{font-size:12px;fill:#57606a}\
 .grid{stroke:#e4e7eb;stroke-width:1;fill:none}.frame{fill:none;stroke:#8c959f;stroke-width:1}\
@@ -134,7 +135,7 @@ impl Series {
 }
 
 /// Colours of conditions.
-const SHADES: [&str; 5] = ["#1f6feb", "#e8a33d", "#cf222e", "#8250df", "#2da44e"];
+pub const SHADES: [&str; 5] = ["#1f6feb", "#e8a33d", "#cf222e", "#8250df", "#2da44e"];
 
 fn colour_of(estimator: Estimator) -> &'static str {
     match estimator {
@@ -146,10 +147,16 @@ fn colour_of(estimator: Estimator) -> &'static str {
 }
 
 /// Draws a panel's title and below it the names of its series, in the room of [`HEAD`] px above the panel.
-fn head(svg: &mut Svg, title: &str, series: &[Series], [left, top]: [f64; 2]) {
+fn head(svg: &mut Svg, title: &str, series: &[Series], at: [f64; 2]) {
+    let entries: Vec<_> = series.iter().map(|s| (s.name.as_str(), s.colour)).collect();
+    legend(svg, title, &entries, at);
+}
+
+/// The same for names with colours.
+pub fn legend(svg: &mut Svg, title: &str, entries: &[(&str, &str)], [left, top]: [f64; 2]) {
     svg.text([left, top + 18.0], Anchor::Start, "head", title);
     let (mut x, y) = (left, top + 38.0);
-    for Series { name, colour, .. } in series {
+    for (name, colour) in entries {
         svg.add(format_args!(
             r#"<circle fill="{colour}" cx="{:.1}" cy="{:.1}" r="4.5"/>"#,
             x + 5.0,
