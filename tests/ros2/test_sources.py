@@ -64,6 +64,14 @@ def write_urdf(path, driver):
     path.write_text(text.replace("</robot>", f"{driver.extra_urdf}</robot>"))
 
 
+def begin(start, driver, urdf, parameters):
+    """Starts a node for the driver."""
+    write_urdf(urdf, driver)
+    write_parameters(parameters, driver)
+    remapped = ["-r", f"external_torque:={driver.torque_topic}"]
+    return start("--ros-args", "--params-file", parameters, *remapped, **{"robot.description_file": urdf})
+
+
 def definition(type_name):
     """A message's definition with those of all that is nested in it, as rosbag2 writes it."""
     names, texts = [type_name], []
@@ -126,7 +134,7 @@ class Player:
                 self.sent.append((sample.stamp_ns, topic, message))
 
     def start(self, first, is_heard):
-        """Sends what a driver has at its start, NaN for torques, until the node hears it."""
+        """Sends what a driver has at its start, NaN for torques, until the node hears it. Gives how many messages."""
         ticks = itertools.count(first.stamp_ns - 60_000_000_000, 10_000_000)
 
         def sent():
@@ -150,15 +158,12 @@ class Player:
 def test_a_driver_gives_the_same_estimate_over_ros_2_as_out_of_a_bag(peer, start, samples, tmp_path, name):
     driver = DRIVERS[name]
     urdf, parameters = tmp_path / "arm.urdf", tmp_path / "parameters.yaml"
-    write_urdf(urdf, driver)
-    write_parameters(parameters, driver)
-    remapped = ["-r", f"external_torque:={driver.torque_topic}"]
-    start("--ros-args", "--params-file", parameters, *remapped, **{"robot.description_file": urdf})
+    begin(start, driver, urdf, parameters)
     poses = peer.listen(PoseWithCovarianceStamped, "palpate/contact_pose", 1000)
     residuals = peer.listen(JointState, "palpate/residual", 1000)
     diagnostics = peer.listen(DiagnosticArray, "/diagnostics")
     player = Player(peer, driver, samples[0])
-    begin = player.start(samples[0], lambda: int(newest(diagnostics).get("refused, not finite", 0)) > 0)
+    unused = player.start(samples[0], lambda: int(newest(diagnostics).get("refused, not finite", 0)) > 0)
     player.play(samples)
     peer.wait_until(lambda: len(residuals) == USED, "every sample to be used")
     counts = peer.counts(diagnostics)
@@ -168,9 +173,9 @@ def test_a_driver_gives_the_same_estimate_over_ros_2_as_out_of_a_bag(peer, start
     sent = player.sent
     if not driver.is_stamped:
         arrivals = iter(stamps)
-        sent[begin:] = [
+        sent[unused:] = [
             (next(arrivals) if topic == driver.torque_topic else at, topic, message)
-            for at, topic, message in sent[begin:]
+            for at, topic, message in sent[unused:]
         ]
     write_bag(tmp_path / "bag", sent)
     replayed = replay(tmp_path / "bag", urdf, parameters)
@@ -197,6 +202,62 @@ def check_fri_2(sent, replayed, urdf, parameters, bag):
     without = lambda text: text.replace("float64[7] commanded_joint_position\n", "")
     write_bag(bag, sent, change, without)
     assert replay(bag, urdf, parameters) == replayed
+
+
+def without_external_torque(message):
+    message.interface_values[3].interface_names[2] = "torque"
+
+
+def without_values(message):
+    message.interface_values.pop()
+
+
+def without_names(message):
+    message.tau_ext_hat_filtered.name = []
+
+
+def too_few(message):
+    message.data = message.data[:6]
+
+
+def too_many(message):
+    message.data.append(0.0)
+
+
+@pytest.mark.parametrize(
+    "name, spoil, counted",
+    [
+        ("iiwa_ros2", too_few, "refused, wrong length"),
+        ("iiwa_ros2", too_many, "refused, wrong length"),
+        ("lbr_dynamic", without_external_torque, "refused, joint missing"),
+        ("lbr_dynamic", without_values, "refused, unreadable"),
+        ("franka_state", without_names, "refused, joint missing"),
+    ],
+)
+def test_what_a_driver_does_wrong_is_counted_and_survived(peer, start, samples, tmp_path, name, spoil, counted):
+    driver = DRIVERS[name]
+    node = begin(start, driver, tmp_path / "arm.urdf", tmp_path / "parameters.yaml")
+    diagnostics = peer.listen(DiagnosticArray, "/diagnostics")
+    count = lambda key: int(newest(diagnostics).get(key, 0))
+
+    def spoiled(driver, sample):
+        messages = DRIVERS[name].messages(driver, sample)
+        spoil(messages[driver.torque_topic])
+        return messages
+
+    player = Player(peer, driver, samples[0])
+    player.start(samples[0], lambda: count("refused, not finite") > 0)
+    player.driver = dataclasses.replace(driver, messages=spoiled)
+    stamps = itertools.count(samples[0].stamp_ns, 10_000_000)
+
+    def sent():
+        player.send(dataclasses.replace(samples[0], stamp_ns=next(stamps)))
+
+    peer.wait_until(lambda: sent() or count(counted) > 0, f"the count of '{counted}' to rise")
+    used = count("samples used")
+    player.driver = driver
+    peer.wait_until(lambda: sent() or count("samples used") > used, "good messages to be used")
+    assert node.process.poll() is None
 
 
 def test_a_source_that_is_none_is_refused_by_name(start):
