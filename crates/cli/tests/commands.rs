@@ -106,10 +106,12 @@ fn a_simulated_contact_is_replayed_into_one_row_a_sample() {
     let rows = rows(&csv);
     let truth = trial.read("trial/truth.csv");
     assert_eq!(rows.len(), truth.lines().count() - 1);
-    let mut stamps = Vec::new();
-    for row in &rows {
+    let stamp = |row: &Vec<&str>| row[0].parse::<i64>().unwrap();
+    let stamps: Vec<_> = rows.iter().map(stamp).collect();
+    // One sample alone is no contact.
+    assert_eq!(rows[0][1], "none");
+    for row in &rows[1..] {
         assert_eq!(row.len(), 13, "{row:?}");
-        stamps.push(row[0].parse::<i64>().unwrap());
         assert!(["ambiguous", "located"].contains(&row[1]), "{row:?}");
         assert!(row[2].starts_with("lbr_link_"), "{row:?}");
         let numbers: Vec<f64> = row[3..]
