@@ -1,7 +1,8 @@
 # Source this from bash to have a ROS 2: the one that is already sourced, else a small one that is installed from
 # Python wheels into .ros2/ at the repository's root, without root rights and once only. Needs python3 with venv and a
 # C and C++ compiler. Where the drivers' messages are not found, packages with messages of the same shape are built into
-# .ros2/messages, so that the node can be built and tested with them. Ends the sourcing shell's command with a non-zero status, and a sentence, where that fails.
+# .ros2/messages, so that the node can be built and tested with them. Ends the sourcing shell's command with a non-zero
+# status, and a sentence, where that fails.
 
 _palpate_install_ros2() (
     set -euo pipefail

@@ -91,7 +91,8 @@ class Package:
 
     def link(self, target, sources, libraries):
         prefixes = [self.prefix, *self.sourced]
-        includes = [f"-I{folder}" for prefix in prefixes for folder in [prefix / "include", *sorted(prefix.glob("include/*"))]]
+        headers = [folder for prefix in prefixes for folder in [prefix / "include", *sorted(prefix.glob("include/*"))]]
+        includes = [f"-I{folder}" for folder in headers]
         includes.append(f"-I{sysconfig.get_paths()['include']}")
         includes.append(f"-I{numpy_headers()}")
         folders = [f"-L{prefix / 'lib'}" for prefix in prefixes]
@@ -102,7 +103,8 @@ class Package:
         run([compiler, *options, "-o", target, *objects, *folders, *needed])
 
     def compile_one(self, source, stem, includes):
-        compiler = os.environ.get("CXX", "c++") if source.suffix == ".cpp" else os.environ.get("CC", "cc")
+        cc, cxx = os.environ.get("CC", "cc"), os.environ.get("CXX", "c++")
+        compiler = cxx if source.suffix == ".cpp" else cc
         out = self.build / "objects" / self.name / stem / f"{source.name}.o"
         out.parent.mkdir(parents=True, exist_ok=True)
         run([compiler, "-c", "-fPIC", "-O1", "-w", *includes, source, "-o", out])

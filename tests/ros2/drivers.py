@@ -90,10 +90,12 @@ FRANKA_HAND = """
   <link name="fr3_leftfinger"/>
   <link name="fr3_rightfinger"/>
   <joint name="fr3_finger_joint1" type="prismatic">
-    <parent link="lbr_link_ee"/><child link="fr3_leftfinger"/><limit lower="0" upper="0.04" effort="100" velocity="0.2"/>
+    <parent link="lbr_link_ee"/><child link="fr3_leftfinger"/>
+    <limit lower="0" upper="0.04" effort="100" velocity="0.2"/>
   </joint>
   <joint name="fr3_finger_joint2" type="prismatic">
-    <parent link="lbr_link_ee"/><child link="fr3_rightfinger"/><limit lower="0" upper="0.04" effort="100" velocity="0.2"/>
+    <parent link="lbr_link_ee"/><child link="fr3_rightfinger"/>
+    <limit lower="0" upper="0.04" effort="100" velocity="0.2"/>
     <mimic joint="fr3_finger_joint1"/>
   </joint>
 """
