@@ -188,7 +188,13 @@ impl Detector {
         }
         self.period_secs += (step_secs - self.period_secs) / PERIOD_SAMPLES;
         self.charts.advance(step_secs);
+        let begins = self.motion.has_begun();
         self.motion.update(position, step_secs);
+        if begins {
+            // What motion gets wrong is not yet part of the bias.
+            let unknown = 2.0 * self.parameters.motion_std * self.motion.quickness();
+            (self.joints.iter_mut()).for_each(|joint| joint.bias.variance += unknown * unknown);
+        }
         step_secs
     }
 

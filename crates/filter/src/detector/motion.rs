@@ -27,6 +27,13 @@ struct JointMotion {
 }
 
 impl JointMotion {
+    /// Takes the second position of a stream in, the first that tells a speed.
+    fn begin(&mut self, position: f64, step_secs: f64) {
+        self.velocity = (position - self.position) / step_secs;
+        self.peak = self.velocity.abs();
+        self.position = position;
+    }
+
     fn update(&mut self, position: f64, step_secs: f64) {
         let before = self.velocity;
         let follow = |secs: f64| 1.0 - (-step_secs / secs).exp();
@@ -60,6 +67,8 @@ pub(super) struct Motion {
     joints: Vec<JointMotion>,
     turning: Vec<f64>,
     speed: f64,
+    /// Whether there is only one position yet.
+    has_begun: bool,
 }
 
 impl Motion {
@@ -68,6 +77,7 @@ impl Motion {
             joints: vec![JointMotion::default(); dof],
             turning: vec![0.0; dof],
             speed: 0.0,
+            has_begun: true,
         }
     }
 
@@ -81,15 +91,25 @@ impl Motion {
         }
         self.turning.fill(0.0);
         self.speed = 0.0;
+        self.has_begun = true;
+    }
+
+    /// Whether only one position is known yet, and no speed.
+    pub(super) fn has_begun(&self) -> bool {
+        self.has_begun
     }
 
     /// Takes a position in.
     pub(super) fn update(&mut self, position: &[f64], step_secs: f64) {
         let mut squares = 0.0;
         for (joint, &position) in self.joints.iter_mut().zip(position) {
-            joint.update(position, step_secs);
+            match self.has_begun {
+                true => joint.begin(position, step_secs),
+                false => joint.update(position, step_secs),
+            }
             squares += joint.velocity * joint.velocity;
         }
+        self.has_begun = false;
         for (turning, joint) in self.turning.iter_mut().zip(&self.joints) {
             *turning = joint.turning();
         }
