@@ -227,11 +227,9 @@ impl Sums {
             row[COLUMNS - 1] += precision * mean;
             gram[COLUMNS - 1][COLUMNS - 1] += precision * mean * mean;
             for j in 0..i {
-                let mut entry = self.mixed[i][j];
-                for k in 0..j {
-                    entry -= factor[i][k] * factor[j][k];
-                }
-                entry *= factor[j][j];
+                let before = factor[i][..j].iter().zip(&factor[j][..j]);
+                let known: f64 = before.map(|(one, other)| one * other).sum();
+                let entry = (self.mixed[i][j] - known) * factor[j][j];
                 factor[i][j] = entry;
                 pivot -= entry * entry;
                 for (value, other) in row.iter_mut().zip(&white[j]) {
