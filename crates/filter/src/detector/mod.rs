@@ -4,8 +4,9 @@
 //! and long ones for soft ones. A smoothed residual that exceeds so many of its standard deviations that noise does it at
 //! most at the stated rate ([`alarm`]) is a contact. The standard deviation is learned while nothing touches ([`noise`]):
 //! white noise from second differences, what does not average out from the smoothed residuals themselves, so that noise
-//! may be correlated or quantised, and what grows with motion. The bias is a slow random walk ([`bias`]), faster in motion.
-//! All learning from the time shortly before a contact is taken back.
+//! may be correlated or quantised, and what grows with motion or comes where a joint turns back ([`motion`]), as friction
+//! does. The bias is a slow random walk ([`bias`]), faster in motion. What was learned shortly before a contact is taken
+//! back ([`blocks`]), and nothing is learned during one.
 
 mod alarm;
 mod bias;
@@ -14,8 +15,9 @@ mod joint;
 mod motion;
 mod noise;
 mod parameters;
+mod reach;
 
-use palpate_model::{JointSample, Link, Robot};
+use palpate_model::{JointSample, Robot};
 
 use crate::{Admitted, ContactChange, ContactEvent, Detection, ParameterError};
 
@@ -25,6 +27,7 @@ use blocks::Blocks;
 use joint::{Charts, JointDetector, Weighing};
 use motion::Motion;
 pub use parameters::DetectorParameters;
+use reach::Reach;
 
 /// After so long without sample the smoothed residuals begin anew, s.
 const GAP_SECS: f64 = 0.5;
@@ -58,8 +61,7 @@ pub struct Detector {
     quiet_secs: f64,
     /// Where the robot was when the present contact began.
     contact_position: Vec<f64>,
-    /// The link that each joint moves, and how many joints move that.
-    moved: Vec<(usize, usize)>,
+    reach: Reach,
     bias: Vec<JointBias>,
     detection: Detection,
 }
@@ -72,11 +74,6 @@ impl Detector {
     pub fn new(robot: &Robot, parameters: &DetectorParameters) -> Result<Self, ParameterError> {
         parameters.check()?;
         let dof = robot.dof();
-        let moved = |joint: usize| {
-            let moves = |link: &Link| link.joint == Some(joint);
-            let link = robot.links.iter().position(moves).unwrap_or(0);
-            (link, robot.links[link].path.len())
-        };
         let joint = JointDetector::new(parameters);
         Ok(Self {
             joints: vec![joint; dof],
@@ -91,7 +88,7 @@ impl Detector {
             is_off_turns: false,
             quiet_secs: 0.0,
             contact_position: vec![0.0; dof],
-            moved: (0..dof).map(moved).collect(),
+            reach: Reach::new(robot),
             bias: vec![JointBias::default(); dof],
             detection: Detection {
                 joints: vec![false; dof],
@@ -314,24 +311,11 @@ impl Detector {
             true => self.detection.confidence.max(self.confidence()),
             false => 0.0,
         };
-        let depth = |joint: usize| self.moved[joint].1;
-        let mut last = None;
-        for (index, joint) in self.joints.iter().enumerate() {
-            let feels = in_contact && joint.ratio >= 1.0;
-            self.detection.joints[index] = feels;
-            if feels && last.is_none_or(|known| depth(known) < depth(index)) {
-                last = Some(index);
-            }
+        for (feels, joint) in self.detection.joints.iter_mut().zip(&self.joints) {
+            *feels = in_contact && joint.ratio >= 1.0;
         }
-        let Some((link, depth)) = last.map(|joint| self.moved[joint]) else {
-            return;
-        };
         let known = self.detection.first_link;
-        let is_known = |moved: &&(usize, usize)| Some(moved.0) == known;
-        let known_depth = self.moved.iter().find(is_known).map_or(0, |moved| moved.1);
-        if depth > known_depth {
-            self.detection.first_link = Some(link);
-        }
+        self.detection.first_link = self.reach.first_link(&self.detection.joints, known);
     }
 
     fn tell_bias(&mut self) {
