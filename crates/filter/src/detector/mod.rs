@@ -189,7 +189,7 @@ impl Detector {
         self.motion.update(position, step_secs);
         if begins {
             // What motion gets wrong is not yet part of the bias.
-            let unknown = 2.0 * self.parameters.motion_std * self.motion.quickness();
+            let unknown = self.parameters.motion_std * self.motion.quickness();
             (self.joints.iter_mut()).for_each(|joint| joint.bias.variance += unknown * unknown);
         }
         step_secs
