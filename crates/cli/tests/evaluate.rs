@@ -245,9 +245,9 @@ fn detection_tells_false_alarms_and_what_became_of_pushes() {
     let pushes = rows(&read(&folder, "pushes.csv"));
     assert_eq!(pushes.len(), 2 * 5 * 2 * 5);
     for row in &pushes {
-        assert_eq!((number(row, "link"), number(row, "pushes")), (6.0, 1.0));
+        assert_eq!((number(row, "link"), number(row, "pushes")), (6.0, 2.0));
         if row[1].1 == "slow" && row[2].1 == "momentum observer" && number(row, "force") >= 10.0 {
-            assert_eq!(number(row, "noticed"), 1.0, "{row:?}");
+            assert_eq!(number(row, "noticed"), 2.0, "{row:?}");
             assert!(number(row, "most_delay_secs") < 0.1, "{row:?}");
         }
     }
