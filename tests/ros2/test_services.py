@@ -60,8 +60,11 @@ def test_a_tare_is_refused_in_contact_and_ended_by_one(peer, start):
     arm.wait_until_heard()
     # What touches since the beginning may as well be a bias.
     arm.send_until(lambda: len(diagnostics) > 1, "the node to see the arm free")
-    answer = call_meanwhile(arm, Trigger, "palpate/tare", TOUCHED)
-    assert not answer.success and "something touched" in answer.message, answer
+    answer = peer.ask(Trigger, "palpate/tare")
+    seen = len(diagnostics)
+    arm.send_until(lambda: len(diagnostics) > seen, "the tare to be under way")
+    arm.send_until(answer.done, "the tare to end", torques=TOUCHED)
+    assert not answer.result().success and "something touched" in answer.result().message, answer.result()
     answer = call_meanwhile(arm, Trigger, "palpate/tare", TOUCHED)
     assert not answer.success and "something touches since" in answer.message, answer
 
