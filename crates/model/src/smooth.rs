@@ -57,7 +57,7 @@ struct Patch {
     smooth_across: [u32; 3],
 }
 
-/// A foot on a patch's plane and what a Newton step from there says.
+/// A point of a patch's plane, in the patch's coordinates.
 struct Foot {
     triangle: u32,
     at: Vector2<f64>,

@@ -106,6 +106,8 @@ pub(super) struct Noise {
     bias: [Vec<BiasPrior>; BIAS_SCALES.len()],
     /// Log evidence of each joint's torques if nothing touched, for one scale of the biases.
     base: [Vec<f64>; BIAS_SCALES.len()],
+    /// The same of all joints together, with the density of what was seen of the biases before.
+    base_of_all: [f64; BIAS_SCALES.len()],
     /// Half of the log of each joint's weights, summed.
     log_weights: Vec<f64>,
     /// Inverse variances, joint by joint for each keyframe.
@@ -124,6 +126,7 @@ impl Noise {
             square: vec![0.0; dof],
             bias: std::array::from_fn(|_| vec![BiasPrior::default(); dof]),
             base: std::array::from_fn(|_| vec![0.0; dof]),
+            base_of_all: [0.0; BIAS_SCALES.len()],
             log_weights: vec![0.0; dof],
             weights: Vec::new(),
         }
@@ -262,6 +265,10 @@ impl Noise {
                 base[joint] = 0.5 * (log - second + explained - (1.0 + weight / precision).ln());
             }
         }
+        for (scale, all) in self.base_of_all.iter_mut().enumerate() {
+            let bias = self.bias[scale].iter().map(|bias| bias.log);
+            *all = self.base[scale].iter().sum::<f64>() + bias.sum::<f64>();
+        }
     }
 
     pub(super) fn bias_scales(&self) -> usize {
@@ -276,9 +283,7 @@ impl Noise {
     /// Log evidence of the torques of all joints beside a path, which feel nothing, and for those of the path the
     /// noise's log density but for the products with its inverse covariance.
     pub(super) fn base_beside(&self, scale: usize, path: &[usize]) -> f64 {
-        let bias = self.bias[scale].iter().map(|bias| bias.log);
-        let all: f64 = self.base[scale].iter().sum::<f64>() + bias.sum::<f64>();
         let own = |&joint: &usize| self.log_weights[joint] - self.base[scale][joint];
-        all + path.iter().map(own).sum::<f64>()
+        self.base_of_all[scale] + path.iter().map(own).sum::<f64>()
     }
 }

@@ -19,11 +19,14 @@ use crate::step::Step;
 
 /// Draws for each particle at the start.
 const FIRST_DRAWS: usize = 8;
-/// Climbs from new places at each keyframe, the first of them from beside the best peaks, and the steps of each.
+/// Climbs from new places at each keyframe, and the steps of each.
 const HOPS: usize = 16;
-const HOPS_FROM_PEAKS: usize = 6;
-const FAR_HOPS: usize = 8;
 const HOP_CLIMB: usize = 3;
+/// The first of them begin somewhat farther from one of so many best peaks, with any kind of obstacle.
+const FAR_HOPS: usize = 8;
+const FAR_HOPS_FROM: usize = 4;
+/// The next ones begin beside these many best peaks, the others at particles.
+const HOPS_FROM_PEAKS: usize = 6;
 /// Share of the particles below which their effective number may fall.
 const RESAMPLE_BELOW: f64 = 0.5;
 /// Evaluations that one Newton step takes.
@@ -161,11 +164,11 @@ impl PalpateFilter {
     fn hop_start(&self, index: usize, history: &History) -> Obstacle {
         let mut random = stream(self.seed, self.key, index, Purpose::Hop);
         if index < FAR_HOPS && !self.peaks.is_empty() {
-            let among = self.peaks.len().min(4);
+            let among = self.peaks.len().min(FAR_HOPS_FROM);
             let peak = &self.peaks[random.random_range(0..among)];
             return history.elsewhere(&peak.obstacle, &mut random);
         }
-        let index = index - FAR_HOPS.min(index);
+        let index = index.saturating_sub(FAR_HOPS);
         match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
             Some(peak) => {
                 let own = peak.obstacle.likeness;
