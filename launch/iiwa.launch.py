@@ -13,8 +13,8 @@ from launch_ros.parameter_descriptions import ParameterValue
 # The installed share folder has the layout of the repository.
 SHARE = Path(__file__).resolve().parents[1]
 
-# Namespace that each driver starts in, topic of its torques there, and root link of its URDF. The parameter file of a
-# driver has its name.
+# Namespace that each driver starts in, topic of its torques there, and the frame that its robot stands in. The parameter
+# file of a driver has its name.
 DRIVERS = {
     "lbr_fri_ros2_stack": ("lbr", "state", "world"),
     "kuka_drivers": ("", "external_torque_broadcaster/joint_states", "world"),
