@@ -95,6 +95,54 @@ def test_torques_may_be_stamped_ahead_of_positions_or_behind(peer, node, ahead_n
     arm.send_until(working, "the node to work", torque_ahead_ns=ahead_ns)
 
 
+@pytest.mark.parametrize("ahead_secs", [30, -30], ids=["ahead", "behind"])
+def test_torques_stamped_far_from_positions_are_told_until_the_clocks_agree(peer, node, ahead_secs):
+    arm = Arm(peer)
+    diagnostics = peer.listen(DiagnosticArray, "/diagnostics")
+    arm.wait_until_heard()
+    status = lambda: diagnostics[-1].status[0] if diagnostics else None
+    values = lambda: {value.key: value.value for value in status().values}
+
+    def told():
+        unpaired = status() and status().message == "no torque finds a position of its time"
+        return unpaired and int(values()["torques without position"]) > 0
+
+    arm.send_until(told, "torques without a position to be told", torque_ahead_ns=ahead_secs * 1_000_000_000)
+    assert status().level == DiagnosticStatus.ERROR and values()["samples used"] == "0"
+    behind_secs = float(values()["torque stamps behind positions', s"])
+    assert abs(behind_secs + ahead_secs) < 1.0, behind_secs
+    arm.send_until(lambda: status().message == "working", "the node to work")
+    assert node.process.poll() is None
+
+
+def test_positions_too_rare_for_the_tolerance_are_told(peer, node):
+    arm = Arm(peer)
+    diagnostics = peer.listen(DiagnosticArray, "/diagnostics")
+    arm.wait_until_heard()
+    stamps, values = itertools.count(time.time_ns(), 10_000_000), {}
+
+    def sent():
+        """Positions every 0.1 s, torques every 0.01 s: half of these are further off than 0.02 s."""
+        for turn in range(10):
+            stamp_ns = next(stamps)
+            if turn == 0:
+                state = joint_state(stamp_ns, JOINTS)
+                state.position = ZEROS
+                arm.positions.publish(state)
+            effort = joint_state(stamp_ns, JOINTS)
+            effort.effort = ZEROS
+            arm.torques.publish(effort)
+        status = diagnostics[-1].status[0] if diagnostics else None
+        if status and status.message == "some torques find no position of their time":
+            assert status.level == DiagnosticStatus.WARN
+            values.update({value.key: int(value.value) for value in status.values if value.value.isdigit()})
+        return values.get("torques without position", 0) > 100
+
+    peer.wait_until(sent, "torques without a position to be told")
+    unpaired, used = values["torques without position"], values["samples used"]
+    assert 0.4 < used / (used + unpaired) < 0.6, values
+
+
 @pytest.mark.parametrize("every", [(1, 4), (4, 1)], ids=["positions_faster", "torques_faster"])
 def test_topics_may_come_at_different_rates(peer, start, every):
     # Pairs are as far apart as the slower topic's messages, on a busy machine.

@@ -13,6 +13,16 @@ from support import JOINTS, LATCHED, PARTICLES, SAMPLES, URDF, palpate, play
 from visualization_msgs.msg import Marker, MarkerArray
 
 LINK, LINK_INDEX = "lbr_link_4", 4
+# What /diagnostics always tells.
+TOLD = {
+    "position messages", "torque messages", "samples used", "positions, Hz", "torques, Hz", "samples used, Hz",
+    "samples lost, filter too slow", "torques without position", "positions without torque",
+    "refused, joint missing", "refused, wrong length", "refused, unreadable", "refused, not measured",
+    "refused, not finite", "refused, too large", "refused, stamp not after", "time started anew",
+    "age of the newest sample, s", "position stamps behind now, s", "torque stamps behind now, s",
+    "torque stamps behind positions', s", "status", "step p50, ms", "step p99, ms", "particles",
+    "effective sample size", "spread of the particles, m", "seed", "age of the tare, s",
+}  # fmt: skip
 
 
 @pytest.fixture(scope="session")
@@ -58,6 +68,10 @@ def test_a_touch_is_located_drawn_and_counted(peer, domain, start, bag, paramete
         assert math.dist((position.x, position.y, position.z), [float(row[axis]) for axis in "xyz"]) < 1e-5, row
     check_details(residuals, probabilities)
     check_figures(peer.counts(diagnostics))
+    check_health(diagnostics)
+    late = peer.listen(Bool, "palpate/contact_detected", LATCHED)
+    peer.wait_until(lambda: late, "a late listener to be told")
+    assert [message.data for message in late] == [detected[-1].data]
     # Both see the contact for as long.
     assert len(poses) == sum(row["status"] != "none" for row in replayed.values())
 
@@ -76,6 +90,15 @@ def check_figures(counts):
     assert 1.0 <= float(counts["effective sample size"]) <= PARTICLES
     assert 0.0 < float(counts["spread of the particles, m"]) < 0.5
     assert counts["age of the tare, s"] == "none"
+
+
+def check_health(diagnostics):
+    stamps = [stamp_ns(message) for message in diagnostics]
+    assert all(later - earlier > 900_000_000 for earlier, later in zip(stamps, stamps[1:])), stamps
+    seconds = [{value.key: value.value for value in message.status[0].values} for message in diagnostics]
+    busy = [values for values in seconds if float(values.get("samples used, Hz", 0.0)) > 0.0]
+    assert busy and all(TOLD <= values.keys() for values in busy), busy
+    assert all(0.0 < float(values["step p50, ms"]) <= float(values["step p99, ms"]) for values in busy), busy
 
 
 def stamp_ns(message):

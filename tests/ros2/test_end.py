@@ -42,3 +42,12 @@ def test_a_missing_parameter_file_ends_it_with_a_sentence(start):
     assert node.wait() == 2
     said = node.log().splitlines()
     assert len(said) == 1 and "/nowhere/palpate.yaml" in said[0], said
+
+
+def test_an_unknown_key_in_a_parameter_file_ends_it_with_a_sentence(start, tmp_path):
+    parameters = tmp_path / "parameters.yaml"
+    parameters.write_text("/**:\n  ros__parameters:\n    filter:\n      particlez: 5\n")
+    node = start("--ros-args", "--params-file", parameters, **{"robot.description_file": URDF})
+    assert node.wait() == 2
+    said = node.log().splitlines()
+    assert len(said) == 1 and "filter.particlez" in said[0] and "unknown" in said[0], said

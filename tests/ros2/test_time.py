@@ -18,6 +18,19 @@ def test_time_that_starts_anew_is_followed(peer, node):
     arm.send_until(lambda: int(peer.counts(diagnostics)["samples used"]) > used, "samples to be used again")
 
 
+def test_time_that_leaps_ahead_goes_on(peer, node):
+    """As when a bag is sought forward."""
+    arm = Arm(peer)
+    diagnostics = peer.listen(DiagnosticArray, "/diagnostics")
+    arm.wait_until_heard()
+    arm.send_until(lambda: diagnostics and int(peer.counts(diagnostics)["samples used"]) > 0, "samples to be used")
+    arm.offset_ns = 500_000_000_000
+    said = lambda: diagnostics[-1].status[0].message.startswith("stamps lie ahead")
+    arm.send_until(said, "later samples to be used")
+    counts = peer.counts(diagnostics)
+    assert counts["time started anew"] == counts["refused, stamp not after"] == "0", counts
+
+
 def test_a_jump_is_refused_where_it_is_not_to_be_followed(peer, start):
     start(**{"robot.description_file": URDF, "input.reset_on_time_jump": "false"})
     arm = Arm(peer)
