@@ -6,8 +6,11 @@ use palpate_model::Robot;
 use palpate_sim::solid::with_finer_body;
 use palpate_sim::{ObstacleKind, Scenario, coarsen};
 
-/// A variation of the one basic scenario: a sphere, white noise of 10 % of each joint's rms torque, and the filter's
-/// own mesh as the true one.
+/// Time without contact before it, s: an arm that touches something was free before.
+const LEAD_IN_SECS: f64 = 2.0;
+
+/// A variation of the one basic scenario: a sphere, met after a short approach, white noise of 10 % of each joint's rms
+/// torque, and the filter's own mesh as the true one.
 pub struct Condition {
     /// Name in options, tables and files.
     pub name: &'static str,
@@ -37,6 +40,7 @@ impl Condition {
         let mut scenario = Scenario {
             seed,
             noise_fraction: 0.1,
+            lead_in_secs: LEAD_IN_SECS,
             duration_secs: secs,
             refine_levels: 0,
             ..Scenario::new(link)
@@ -70,7 +74,7 @@ impl Condition {
 }
 
 /// Every condition.
-pub static CONDITIONS: [Condition; 13] = [
+pub static CONDITIONS: [Condition; 14] = [
     Condition::new("noise0", "sphere, no noise", |s| s.noise_fraction = 0.0),
     Condition::new("noise5", "sphere, 5 % noise", |s| s.noise_fraction = 0.05),
     Condition::new("noise10", "sphere of 30 mm radius, 10 % noise", |_| {}),
@@ -88,6 +92,14 @@ pub static CONDITIONS: [Condition; 13] = [
         "bias",
         "sphere, 10 % noise, a constant bias on every joint, drawn with σ = 0.2 Nm",
         |s| s.bias_sigma = 0.2,
+    ),
+    Condition::new(
+        "begun",
+        "the same bias, and in contact from the first sample",
+        |s| {
+            s.bias_sigma = 0.2;
+            s.lead_in_secs = 0.0;
+        },
     ),
     Condition::new(
         "friction",

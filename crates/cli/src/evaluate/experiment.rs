@@ -58,7 +58,7 @@ pub static EXPERIMENTS: [Experiment; 16] = [
         &["noise0", "noise5", "noise10"],
     ),
     error("edge", "A cube's edge (the paper's figure 6)", &["edge"]),
-    error("bias", "A bias on every joint", &["bias"]),
+    error("bias", "A bias on every joint", &["bias", "begun"]),
     error("friction", "Friction", &["friction"]),
     error(
         "finer",
