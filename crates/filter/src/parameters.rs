@@ -55,7 +55,7 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Number of particles of the chosen method.
+    /// Most particles of the chosen method.
     pub fn particle_count(&self) -> usize {
         match self.method {
             Method::Paper => self.particles,

@@ -95,6 +95,12 @@ const CASES: &[Case] = &[
         &[0.0, 49.0, 100_001.0],
     ),
     (
+        "palpate.min_hypotheses",
+        "50",
+        |p, v| p.palpate.min_hypotheses = v as usize,
+        &[0.0, 49.0, 100_001.0],
+    ),
+    (
         "palpate.rounds",
         "100",
         |p, v| p.palpate.rounds = v as usize,

@@ -206,6 +206,7 @@ fn fewest(method: Method) -> Parameters {
         palpate: PalpateParameters {
             hypotheses: 50,
             rounds: 1,
+            ..PalpateParameters::default()
         },
         ..Parameters::default()
     }

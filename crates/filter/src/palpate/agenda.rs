@@ -19,8 +19,8 @@ pub(super) enum Phase {
     Climb,
     /// Climb from beside the peaks.
     Hop,
-    /// Climb from the candidates of a scan.
-    Scan,
+    /// Climb from the candidates of a scan, so many rounds, each with fewer of them.
+    Scan(usize),
     /// Climb as bars from the best balls.
     Bars,
     /// See what systematic errors would do to each peak.

@@ -47,7 +47,14 @@ mod tests {
 
     #[test]
     fn bins_with_little_weight_do_not_count() {
-        let particles = [(3, 0.3), (1, 0.004), (3, 0.3), (2, 0.39), (1, 0.004), (7, 0.002)];
+        let particles = [
+            (3, 0.3),
+            (1, 0.004),
+            (3, 0.3),
+            (2, 0.39),
+            (1, 0.004),
+            (7, 0.002),
+        ];
         let mut workspace = Vec::new();
         assert_eq!(bins(particles.into_iter(), 0.01, &mut workspace), 2);
         assert_eq!(bins(particles.into_iter(), 0.006, &mut workspace), 3);

@@ -8,6 +8,7 @@
 
 mod agenda;
 mod chart;
+mod crowd;
 mod evidence;
 mod history;
 mod likeness;
@@ -66,6 +67,8 @@ pub(crate) struct PalpateFilter {
     agenda: Agenda,
     bench: Workbench,
     chosen: Vec<u32>,
+    /// Number of particles that the posterior asks for.
+    crowd: usize,
     /// Number of the sample that completed the newest keyframe: keys the random streams.
     key: u64,
     /// Keyframes since the contact began, and how many of the last ones did not fit.
@@ -76,19 +79,20 @@ pub(crate) struct PalpateFilter {
 impl PalpateFilter {
     pub(crate) fn new(robot: &Robot, parameters: PalpateParameters, seed: u64) -> Self {
         Self {
-            parameters,
             seed,
             memory: Memory::new(robot),
             noise: Noise::new(robot.dof()),
             particles: Vec::new(),
             weights: Vec::new(),
             peaks: Vec::new(),
+            crowd: parameters.hypotheses,
             agenda: Agenda::new(),
             bench: Workbench::default(),
             chosen: Vec::new(),
             key: 0,
             keyframes: 0,
             misfits: 0,
+            parameters,
         }
     }
 
@@ -106,6 +110,7 @@ impl PalpateFilter {
         self.agenda.enter(Phase::Idle);
         self.keyframes = 0;
         self.misfits = 0;
+        self.crowd = self.parameters.hypotheses;
     }
 
     /// One step: remember; when the last keyframe's work is done and the next complete, take that in; work.

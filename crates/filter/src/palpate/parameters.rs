@@ -8,8 +8,11 @@ use crate::ParameterError;
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct PalpateParameters {
-    /// Number of hypotheses that are weighed by the whole history; these are the cloud's particles. Default 400.
+    /// Most hypotheses that are weighed by the whole history; these are the cloud's particles. Default 400.
     pub hypotheses: usize,
+    /// Fewest of them, where all agree about the place (KLD-sampling, Fox 2003, sets their number); no fewer than
+    /// `hypotheses` if that is less. Default 100.
+    pub min_hypotheses: usize,
     /// Moves that each hypothesis tries after each keyframe. Default 4.
     pub rounds: usize,
 }
@@ -18,6 +21,7 @@ impl Default for PalpateParameters {
     fn default() -> Self {
         Self {
             hypotheses: 400,
+            min_hypotheses: 100,
             rounds: 4,
         }
     }
@@ -32,6 +36,13 @@ impl PalpateParameters {
             "50 … 100,000",
             count,
             (50.0..=1e5).contains(&count),
+        )?;
+        let least = self.min_hypotheses as f64;
+        check(
+            "filter.palpate.min_hypotheses",
+            "50 … 100,000",
+            least,
+            (50.0..=1e5).contains(&least),
         )?;
         let rounds = self.rounds as f64;
         check(

@@ -232,15 +232,19 @@ impl Peak {
     }
 }
 
-/// Most peaks kept.
-const MOST: usize = 24;
+/// Most peaks kept from keyframe to keyframe.
+pub(super) const MOST: usize = 24;
+/// Of those whose log mass is so much below the best one's,
+const FAINT: f64 = 300.0;
+/// only as many as to have so many in all.
+const FEW: usize = 8;
 
-/// Leaves the peaks with the largest mass, each once, the largest first.
-pub(super) fn keep_best(peaks: &mut Vec<Peak>) {
+/// Leaves at most `most` peaks, those with the largest mass, each once, the largest first.
+pub(super) fn keep_best(peaks: &mut Vec<Peak>, most: usize) {
     peaks.sort_by(|a, b| b.log_mass.total_cmp(&a.log_mass));
-    let mut kept: Vec<Peak> = Vec::with_capacity(MOST);
+    let mut kept: Vec<Peak> = Vec::with_capacity(most.min(peaks.len()));
     for peak in peaks.drain(..) {
-        if kept.len() < MOST
+        if kept.len() < most
             && peak.log_mass.is_finite()
             && !kept.iter().any(|other| other.is_same(&peak))
         {
@@ -248,4 +252,13 @@ pub(super) fn keep_best(peaks: &mut Vec<Peak>) {
         }
     }
     *peaks = kept;
+}
+
+/// Leaves out the faint ones of peaks that [`keep_best`] has put in order.
+pub(super) fn keep_likely(peaks: &mut Vec<Peak>) {
+    let Some(best) = peaks.first().map(|peak| peak.log_mass) else {
+        return;
+    };
+    let likely = peaks.partition_point(|peak| peak.log_mass > best - FAINT);
+    peaks.truncate(likely.max(FEW));
 }

@@ -19,8 +19,11 @@ const DRAWN: usize = 3;
 const RADII: [f64; 3] = [0.006, 0.04, 0.25];
 /// Directions that a bar may start with.
 const DIRECTIONS: usize = 4;
-/// Newton steps of a climb.
-pub(super) const CLIMB: usize = 8;
+/// How many of the best go on in each round of a scan, and by how many Newton steps: successive halving (Jamieson and
+/// Talwalkar 2016).
+pub(super) const ROUNDS: [(usize, usize); 3] = [(usize::MAX, 1), (40, 2), (16, 5)];
+/// Newton steps of a bar's climb.
+pub(super) const BAR_CLIMB: usize = 8;
 /// Ball peaks that bars are tried in the place of.
 pub(super) const BARS: usize = 8;
 
@@ -60,8 +63,8 @@ pub(super) fn candidates(history: &History, seed: u64, key: u64) -> Vec<Candidat
     (taken_for(Likeness::Body).chain(taken_for(Likeness::Mesh))).collect()
 }
 
-/// Climbs from a candidate as a ball.
-pub(super) fn climb_ball(history: &History, candidate: &Candidate) -> Peak {
+/// Where a climb from a candidate as a ball begins.
+pub(super) fn ball(history: &History, candidate: &Candidate) -> Peak {
     let &Candidate { link, likeness, .. } = candidate;
     let triangle = candidate.triangle;
     let surface = history.skin.surface(link);
@@ -73,7 +76,7 @@ pub(super) fn climb_ball(history: &History, candidate: &Candidate) -> Peak {
         normal: surface.normal(triangle),
     };
     let start = |radius| Peak::new(history.obstacle_at(&place, radius, None), history);
-    climb_best(history, RADII.map(start).into_iter())
+    best(RADII.map(start).into_iter())
 }
 
 /// Climbs as a bar from where a peak is.
@@ -82,10 +85,12 @@ pub(super) fn climb_bar(history: &History, ball: &Peak) -> Peak {
         let turn = Some(std::f64::consts::PI * direction as f64 / DIRECTIONS as f64);
         Peak::new(history.reshaped(&ball.obstacle, turn), history)
     };
-    climb_best(history, (0..DIRECTIONS).map(start))
+    let mut peak = best((0..DIRECTIONS).map(start));
+    peak.climb(history, BAR_CLIMB);
+    peak
 }
 
-fn climb_best(history: &History, starts: impl Iterator<Item = Peak>) -> Peak {
+fn best(starts: impl Iterator<Item = Peak>) -> Peak {
     let better = |a: Peak, b: Peak| {
         if b.evidence.log > a.evidence.log {
             b
@@ -93,11 +98,9 @@ fn climb_best(history: &History, starts: impl Iterator<Item = Peak>) -> Peak {
             a
         }
     };
-    let mut peak = starts
+    starts
         .reduce(better)
-        .expect("a climb has at least one start");
-    peak.climb(history, CLIMB);
-    peak
+        .expect("a climb has at least one start")
 }
 
 /// Triangles of one link that a push on explains the newest torques.

@@ -10,9 +10,9 @@ use super::history::{History, Place};
 use super::likeness::Likeness;
 use super::moves::Proposals;
 use super::obstacle::{Obstacle, RADIUS_RANGE};
-use super::peaks::{Peak, keep_best};
+use super::peaks::{MOST, Peak, keep_best, keep_likely};
 use super::scan::Candidate;
-use super::{Hypothesis, PalpateFilter, history, scan, sight};
+use super::{Hypothesis, PalpateFilter, PalpateParameters, crowd, history, scan, sight};
 use crate::random::{Purpose, stream};
 use crate::resample::{effective_sample_size, normalise, systematic};
 use crate::step::Step;
@@ -22,13 +22,14 @@ const FIRST_DRAWS: usize = 8;
 /// Climbs from new places at each keyframe, and the steps of each.
 const HOPS: usize = 16;
 const HOP_CLIMB: usize = 3;
-/// The first of them begin somewhat farther from one of so many best peaks, with any kind of obstacle.
-const FAR_HOPS: usize = 8;
+/// Every other one begins somewhat farther from one of so many best peaks, with any kind of obstacle,
 const FAR_HOPS_FROM: usize = 4;
-/// The next ones begin beside these many best peaks, the others at particles.
+/// the others beside so many best peaks, and then at particles.
 const HOPS_FROM_PEAKS: usize = 6;
 /// Share of the particles below which their effective number may fall.
 const RESAMPLE_BELOW: f64 = 0.5;
+/// By this share their number may differ from what is asked for.
+const RESIZE_BEYOND: f64 = 0.25;
 /// Evaluations that one Newton step takes.
 const STEP_COST: usize = 14;
 /// Evaluations that a look at the systematic errors takes.
@@ -40,6 +41,10 @@ pub(super) struct Workbench {
     particles: Vec<Hypothesis>,
     peaks: Vec<Peak>,
     candidates: Vec<Candidate>,
+    /// Climbs of a scan that are still in the running.
+    climbs: Vec<Peak>,
+    /// Bins of the particles, with weights.
+    occupied: Vec<((u16, u32), f64)>,
     /// The particles as they were before the moves.
     others: Vec<Hypothesis>,
 }
@@ -49,6 +54,7 @@ impl Workbench {
         self.particles.clear();
         self.peaks.clear();
         self.candidates.clear();
+        self.climbs.clear();
     }
 }
 
@@ -61,7 +67,7 @@ impl PalpateFilter {
             Phase::Reweigh => self.reweigh(step),
             Phase::Climb => self.climb(step),
             Phase::Hop => self.hop(step),
-            Phase::Scan => self.scan(step),
+            Phase::Scan(round) => self.scan(step, round),
             Phase::Bars => self.bars(step),
             Phase::Sight => self.sight(step),
             Phase::Move(round) => self.mutate(step, round),
@@ -107,13 +113,16 @@ impl PalpateFilter {
     fn renew_particles(&mut self) {
         std::mem::swap(&mut self.particles, &mut self.bench.particles);
         self.bench.particles.clear();
-        let count = self.parameters.hypotheses;
         normalise(
             self.particles.iter().map(|particle| particle.log_weight),
             &mut self.weights,
         );
+        self.size_crowd();
+        let (count, present) = (self.crowd as f64, self.particles.len() as f64);
+        let fits = (1.0 - RESIZE_BEYOND..1.0 + RESIZE_BEYOND).contains(&(present / count));
         let size = effective_sample_size(&self.weights);
-        if self.particles.len() != count || size < RESAMPLE_BELOW * count as f64 {
+        if !fits || size < RESAMPLE_BELOW * present {
+            let count = self.crowd;
             let mut random = stream(self.seed, self.key, 0, Purpose::Resample);
             systematic(&self.weights, count, random.random(), &mut self.chosen);
             let child = |&parent: &u32| Hypothesis {
@@ -125,6 +134,24 @@ impl PalpateFilter {
             self.bench.particles.clear();
         }
         self.agenda.enter(Phase::Climb);
+    }
+
+    /// How many particles the posterior asks for: bins are triangles.
+    fn size_crowd(&mut self) {
+        let bin = |particle: &Hypothesis| (particle.obstacle.link, particle.obstacle.triangle);
+        let particles = self
+            .particles
+            .iter()
+            .map(bin)
+            .zip(self.weights.iter().copied());
+        let PalpateParameters {
+            hypotheses,
+            min_hypotheses,
+            ..
+        } = self.parameters;
+        let least = 1.0 / hypotheses as f64;
+        let bins = crowd::bins(particles, least, &mut self.bench.occupied);
+        self.crowd = crowd::enough(bins).clamp(min_hypotheses.min(hypotheses), hypotheses);
     }
 
     /// Keeps the peaks on top of the evidence, which each keyframe changes.
@@ -156,19 +183,19 @@ impl PalpateFilter {
             if scan::is_due(self.keyframes) {
                 self.bench.candidates = scan::candidates(&history, self.seed, self.key);
             }
-            self.agenda.enter(Phase::Scan);
+            self.agenda.enter(Phase::Scan(0));
         }
     }
 
     /// Beside a peak, or a particle, seen as a ball or a bar.
     fn hop_start(&self, index: usize, history: &History) -> Obstacle {
         let mut random = stream(self.seed, self.key, index, Purpose::Hop);
-        if index < FAR_HOPS && !self.peaks.is_empty() {
+        if index.is_multiple_of(2) && !self.peaks.is_empty() {
             let among = self.peaks.len().min(FAR_HOPS_FROM);
             let peak = &self.peaks[random.random_range(0..among)];
             return history.elsewhere(&peak.obstacle, &mut random);
         }
-        let index = index.saturating_sub(FAR_HOPS);
+        let index = index / 2;
         match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
             Some(peak) => {
                 let own = peak.obstacle.likeness;
@@ -189,18 +216,35 @@ impl PalpateFilter {
         }
     }
 
-    /// Climbs from the candidates of a scan, if one was due.
-    fn scan(&mut self, step: &Step) {
-        let total = self.bench.candidates.len();
-        let portion = self.portion(total, STEP_COST * scan::CLIMB);
+    /// Climbs from the candidates of a scan, if one was due; after each round, the best go on.
+    fn scan(&mut self, step: &Step, round: usize) {
+        let total = match round {
+            0 => self.bench.candidates.len(),
+            _ => self.bench.climbs.len(),
+        };
+        let (_, steps) = scan::ROUNDS[round];
+        let portion = self.portion(total, STEP_COST * steps);
         let history = history(step, &self.memory, &self.noise);
-        let candidates = self.bench.candidates[portion].par_iter();
-        self.bench
-            .peaks
-            .par_extend(candidates.map(|candidate| scan::climb_ball(&history, candidate)));
-        if self.agenda.done == total {
-            self.renew_peaks();
-            self.agenda.enter(Phase::Bars);
+        if round == 0 {
+            let candidates = self.bench.candidates[portion.clone()].par_iter();
+            let begun = candidates.map(|candidate| scan::ball(&history, candidate));
+            self.bench.climbs.par_extend(begun);
+        }
+        let climbs = self.bench.climbs[portion].par_iter_mut();
+        climbs.for_each(|peak| peak.climb(&history, steps));
+        if self.agenda.done < total {
+            return;
+        }
+        match scan::ROUNDS.get(round + 1) {
+            Some(&(most, _)) => {
+                keep_best(&mut self.bench.climbs, most);
+                self.agenda.enter(Phase::Scan(round + 1));
+            }
+            None => {
+                self.bench.peaks.append(&mut self.bench.climbs);
+                self.renew_peaks();
+                self.agenda.enter(Phase::Bars);
+            }
         }
     }
 
@@ -211,7 +255,7 @@ impl PalpateFilter {
         } else {
             scan::BARS.min(self.peaks.len())
         };
-        let portion = self.portion(total, STEP_COST * scan::CLIMB);
+        let portion = self.portion(total, STEP_COST * scan::BAR_CLIMB);
         let history = history(step, &self.memory, &self.noise);
         let peaks = self.peaks[portion].par_iter();
         self.bench
@@ -225,7 +269,8 @@ impl PalpateFilter {
 
     fn renew_peaks(&mut self) {
         self.peaks.append(&mut self.bench.peaks);
-        keep_best(&mut self.peaks);
+        keep_best(&mut self.peaks, MOST);
+        keep_likely(&mut self.peaks);
     }
 
     /// Looks at what systematic errors would do to each peak.

@@ -11,6 +11,7 @@ pub fn small(method: Method) -> Parameters {
         palpate: PalpateParameters {
             hypotheses: 150,
             rounds: 2,
+            ..PalpateParameters::default()
         },
         ..Parameters::default()
     }
