@@ -42,7 +42,8 @@ def generate_launch_description():
         executable="palpate_node",
         name="palpate",
         namespace=namespace,
-        parameters=[LaunchConfiguration("params")],
+        # Not as a parameter, as a file that is missing would be left out; the node ends with a sentence.
+        ros_arguments=["--params-file", LaunchConfiguration("params")],
         output="screen",
     )
     view = IncludeLaunchDescription(

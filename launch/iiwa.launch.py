@@ -42,16 +42,15 @@ def start(context):
     for name, value in [("namespace", namespace), ("external_torque", torques), ("fixed_frame", frame)]:
         if given[name] == OF_THE_DRIVER:
             given[name] = value
-    files = [str(SHARE / "config" / f"{given['driver']}.yaml"), given["params"]]
+    files = [str(SHARE / "config" / f"{given['driver']}.yaml"), *filter(None, [given["params"]])]
     node = Node(
         package="palpate",
         executable="palpate_node",
         name="palpate",
         namespace=given["namespace"],
-        parameters=[
-            *(file for file in files if file),
-            {"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)},
-        ],
+        # Not as parameters, as a file that is missing would be left out; the node ends with a sentence.
+        ros_arguments=[word for file in files for word in ("--params-file", file)],
+        parameters=[{"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)}],
         remappings=[(topic, given[topic]) for topic in ("joint_states", "external_torque", "robot_description")],
         output="screen",
     )

@@ -47,7 +47,9 @@ def start(context):
         package="palpate",
         executable="palpate_node",
         name="palpate",
-        parameters=[given["params"], BY_THE_BAG],
+        # Not as a parameter, as a file that is missing would be left out; the node ends with a sentence.
+        ros_arguments=["--params-file", given["params"]],
+        parameters=[BY_THE_BAG],
         remappings=[(topic, given[topic]) for topic in ("joint_states", "external_torque")],
         output="screen",
     )
