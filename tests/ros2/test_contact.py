@@ -20,7 +20,7 @@ TOLD = {
     "refused, joint missing", "refused, wrong length", "refused, unreadable", "refused, not measured",
     "refused, not finite", "refused, too large", "refused, stamp not after", "time started anew",
     "age of the newest sample, s", "position stamps behind now, s", "torque stamps behind now, s",
-    "torque stamps behind positions', s", "status", "step p50, ms", "step p99, ms", "particles",
+    "torque stamps behind positions', s", "status", "step p50, ms", "step p99, ms", "step max, ms", "particles",
     "effective sample size", "spread of the particles, m", "seed", "age of the tare, s",
 }  # fmt: skip
 

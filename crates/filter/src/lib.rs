@@ -36,7 +36,9 @@ pub use scene::{
     Arrow, CLOUD_FIELDS, CLOUD_POINT_STEP, CloudField, CloudFieldType, CloudPoint, Colour,
     ContactPose, Label, Scene, pack_cloud,
 };
-pub use settings::{InputSettings, RobotSettings, Settings, SettingsError, VizSettings};
+pub use settings::{
+    InputSettings, RealtimeSettings, RobotSettings, Settings, SettingsError, VizSettings,
+};
 pub use tare::{TareRefusal, TareState};
 pub use torque_settings::{
     FrictionSettings, ObserverSettings, PayloadSettings, SpeedSource, TorqueSettings, TorqueSource,

@@ -50,7 +50,7 @@ pub const PARAMETER_TABLE: &[ParameterRow] = &[
     row("input.source", "", "`joint_state`, `multi_array`, `lbr_state`, `franka_state`, `dynamic_joint_state`", None, false, "messages that external torques come in"),
     row("input.joint_names", "", "", None, false, "joints of messages without names; none: the robot's, in its order"),
     row("input.pairing_tolerance_secs", "s", "0 to 10", Some([0.0, 10.0]), true, "most that stamps of position and torque may differ"),
-    row("input.max_wait_secs", "s", "0 to 3600", Some([0.0, 3600.0]), true, "where the filter is too slow, older samples are lost"),
+    row("input.max_wait_secs", "s", "0 to 3600", Some([0.0, 3600.0]), true, "after a step later than this the newest sample is used, and those before are lost"),
     row("input.time_jump_secs", "s", "≥ 0", Some([0.0, f64::MAX]), true, "a stamp further back than this starts time anew"),
     row("input.reset_on_time_jump", "", "", None, true, "whether time that starts anew is followed; if not, such stamps are refused"),
     row("input.tare_secs", "s", "0.1 to 60", Some([0.1, 60.0]), true, "a tare averages the torques over this"),
@@ -94,4 +94,6 @@ pub const PARAMETER_TABLE: &[ParameterRow] = &[
     row("filter.paper.resample_below", "", "0 to 1", Some([0.0, 1.0]), true, "effective sample size to resample below, as a share"),
     row("filter.paper.fresh_share", "", "0 to 1", Some([0.0, 1.0]), true, "share of fresh particles at each resampling"),
     row("viz.rate", "Hz", "0.1 to 1000", Some([0.1, 1000.0]), true, "most clouds and markers a second"),
+    row("realtime.priority", "", "0 to 99", Some([0.0, 99.0]), false, "SCHED_FIFO priority of the threads that take messages and estimate; 0: the usual scheduling"),
+    row("realtime.cores", "", "-1 to 1023", Some([-1.0, 1023.0]), false, "cores that those threads run on; -1: any"),
 ];

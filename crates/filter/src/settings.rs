@@ -30,6 +30,8 @@ pub struct Settings {
     pub filter: Parameters,
     /// What is drawn, and how often.
     pub viz: VizSettings,
+    /// What the node asks of the system's scheduler.
+    pub realtime: RealtimeSettings,
 }
 
 impl Default for Settings {
@@ -43,6 +45,7 @@ impl Default for Settings {
             torque: TorqueSettings::default(),
             filter: Parameters::default(),
             viz: VizSettings::default(),
+            realtime: RealtimeSettings::default(),
         }
     }
 }
@@ -111,8 +114,8 @@ pub struct InputSettings {
     pub joint_names: Vec<String>,
     /// Stamps of a position and a torque that belong together differ by at most this, s. Default 0.02.
     pub pairing_tolerance_secs: f64,
-    /// A sample that is older than the newest by more than this, s, is lost where the filter has not come to it, and
-    /// counted: where the filter is too slow, the newest data wins. Default 0.5.
+    /// Where a step is so late that a sample has waited for more than this, s, by the samples' stamps, the newest is used;
+    /// those before are lost, and counted. So no estimate tells of what is older. Default 0.1.
     pub max_wait_secs: f64,
     /// A stamp that lies further back than this, s, means that time has started anew, as when a bag is played again:
     /// everything learned is forgotten. Smaller steps back are refused. Default 1.
@@ -129,7 +132,7 @@ impl Default for InputSettings {
             source: Source::default(),
             joint_names: Vec::new(),
             pairing_tolerance_secs: 0.02,
-            max_wait_secs: 0.5,
+            max_wait_secs: 0.1,
             time_jump_secs: 1.0,
             reset_on_time_jump: true,
             tare_secs: 2.0,
@@ -156,6 +159,48 @@ pub struct VizSettings {
 impl Default for VizSettings {
     fn default() -> Self {
         Self { rate: 10.0 }
+    }
+}
+
+/// What the node asks of the system's scheduler, for the threads that take messages and estimate. Where the system
+/// refuses, the node warns and goes on. The estimate does not depend on it.
+#[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct RealtimeSettings {
+    /// Priority of the policy SCHED_FIFO, 1 to 99; 0, the default, leaves the usual policy.
+    pub priority: u8,
+    /// Cores to run on, counted from 0; negative ones are skipped. None, as by default: any.
+    pub cores: Vec<i64>,
+}
+
+impl Default for RealtimeSettings {
+    fn default() -> Self {
+        Self {
+            priority: 0,
+            // ROS 2 has no empty list without a type.
+            cores: vec![-1],
+        }
+    }
+}
+
+impl RealtimeSettings {
+    /// Most that a core may be numbered.
+    const MOST_CORE: i64 = 1023;
+
+    /// The cores to run on; none: any.
+    pub fn chosen_cores(&self) -> Vec<usize> {
+        let chosen = self.cores.iter();
+        chosen.filter_map(|&core| core.try_into().ok()).collect()
+    }
+
+    fn check(&self) -> Result<(), ParameterError> {
+        let fits = self.priority <= 99;
+        in_range("realtime.priority", "0 to 99", self.priority, fits)?;
+        for &core in &self.cores {
+            let fits = (-1..=Self::MOST_CORE).contains(&core);
+            in_range("realtime.cores", "-1 to 1023", core, fits)?;
+        }
+        Ok(())
     }
 }
 
@@ -315,6 +360,7 @@ impl Settings {
     fn check(&self) -> Result<(), ParameterError> {
         self.filter.check()?;
         self.torque.check()?;
+        self.realtime.check()?;
         let tolerance = self.input.pairing_tolerance_secs;
         in_range(
             "input.pairing_tolerance_secs",

@@ -244,10 +244,13 @@ fn the_ends_of_a_range_are_within_it() {
 fn with(name: &str, value: f64) -> Result<Settings, SettingsError> {
     let mut flat = Settings::default().to_flat();
     let entry = flat.iter_mut().find(|entry| entry.0 == name).unwrap();
-    entry.1 = match &entry.1 {
-        Value::Sequence(values) => vec![Value::from(value); values.len()].into(),
-        Value::Number(number) if number.is_i64() || number.is_u64() => (value as i64).into(),
+    let like = |default: &Value| match default {
+        Value::Number(number) if number.is_i64() || number.is_u64() => Value::from(value as i64),
         _ => value.into(),
+    };
+    entry.1 = match &entry.1 {
+        Value::Sequence(defaults) => defaults.iter().map(like).collect::<Vec<_>>().into(),
+        default => like(default),
     };
     Settings::from_flat(flat)
 }

@@ -34,6 +34,7 @@ fn type_of(value: &Value) -> &'static str {
                 _ => "floats",
             }
         }
+        Value::Sequence(values) if values.first().is_some_and(Value::is_i64) => "integers",
         Value::Sequence(_) => "strings",
         other => panic!("no parameter is {other:?}"),
     }

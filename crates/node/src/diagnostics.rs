@@ -126,13 +126,17 @@ impl Diagnostics {
 
 /// Takes the steps' times out, sorted.
 fn look(progress: &Mutex<Progress>) -> Progress {
-    let mut shared = progress.lock().unwrap_or_else(PoisonError::into_inner);
-    let mut steps = std::mem::take(&mut shared.steps);
-    steps.sort_unstable();
-    Progress {
-        steps,
-        ..shared.clone()
-    }
+    let mut looked = {
+        // Estimation waits for this.
+        let mut shared = progress.lock().unwrap_or_else(PoisonError::into_inner);
+        let steps = std::mem::take(&mut shared.steps);
+        Progress {
+            steps,
+            ..shared.clone()
+        }
+    };
+    looked.steps.sort_unstable();
+    looked
 }
 
 fn losses(observed: &Observed<'_>, progress: &Progress) -> Losses {
@@ -198,7 +202,7 @@ fn delays(input: &JointInput) -> [KeyValue; 4] {
     ]
 }
 
-fn figures(settings: &Settings, progress: &Progress) -> [KeyValue; 9] {
+fn figures(settings: &Settings, progress: &Progress) -> [KeyValue; 10] {
     let bias_age = (progress.last_stamp_ns.zip(progress.tared_ns))
         .map(|(last_ns, tared_ns)| (last_ns - tared_ns) as f64 * 1e-9);
     [
@@ -206,6 +210,7 @@ fn figures(settings: &Settings, progress: &Progress) -> [KeyValue; 9] {
         pair("last stamp, ns", progress.last_stamp_ns.unwrap_or_default()),
         pair("step p50, ms", quantile_ms(&progress.steps, 0.50)),
         pair("step p99, ms", quantile_ms(&progress.steps, 0.99)),
+        pair("step max, ms", quantile_ms(&progress.steps, 1.0)),
         pair("particles", settings.filter.particle_count()),
         pair(
             "effective sample size",

@@ -39,7 +39,6 @@ pub struct Progress {
     pub last_stamp_ns: Option<i64>,
     /// Stamp of the sample with which the last tare was done.
     pub tared_ns: Option<i64>,
-    pub particles: usize,
     pub effective_sample_size: f64,
     /// Standard deviation of the particles' points, m.
     pub spread: f64,
@@ -298,15 +297,15 @@ impl Estimation {
     }
 
     fn note(&self, estimate: &ContactEstimate, step: Duration) {
+        // Figures are for somebody who looks once a second; who looks is not to wait for them.
+        let is_time = self.lock_progress().steps.is_empty();
+        let figures = is_time.then(|| (self.filter.effective_sample_size(), self.filter.spread()));
         let mut progress = self.lock_progress();
         progress.intake = self.intake.counts();
         progress.status = estimate.status.word();
         progress.last_stamp_ns = Some(estimate.stamp_ns);
-        // Figures are for somebody who looks once a second.
-        if progress.steps.is_empty() {
-            progress.particles = self.filter.particles().len();
-            progress.effective_sample_size = self.filter.effective_sample_size();
-            progress.spread = self.filter.spread();
+        if let Some(figures) = figures {
+            (progress.effective_sample_size, progress.spread) = figures;
         }
         progress.steps.push(step);
     }

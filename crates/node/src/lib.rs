@@ -10,6 +10,7 @@ mod newest;
 mod parameter_names;
 #[cfg(feature = "ros2")]
 pub mod process;
+pub mod realtime;
 mod throttle;
 mod untyped;
 

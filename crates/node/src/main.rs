@@ -19,7 +19,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use palpate_node::process;
+use palpate_node::{process, realtime};
 
 /// Exit codes: something wrong with the arguments or parameters, and anything else.
 const BAD_PARAMETERS: u8 = 2;
@@ -54,6 +54,10 @@ fn start() -> anyhow::Result<Started> {
     let node = process::create_node("palpate")?;
     let settings = parameters::read(&node)?;
     reader::check_source(&settings.input)?;
+    // The threads that estimate inherit it from this one, which takes messages.
+    for refusal in realtime::claim(&settings.realtime) {
+        tracing::warn!("{refusal}");
+    }
     Ok((node, settings, stop))
 }
 

@@ -39,15 +39,18 @@ impl<T> Newest<T> {
         self.push_over(entry, |_, _| false);
     }
 
-    /// Puts an entry in, in place of the oldest where there is no room, and of the oldest ones that are `stale` beside
-    /// it.
+    /// Puts an entry in, in place of the oldest where there is no room, and of all that wait where the oldest is `stale`
+    /// beside it: a reader that is late goes on with the newest, and not with what is nearly stale.
     pub fn push_over(&self, entry: T, stale: impl Fn(&T, &T) -> bool) {
         let mut state = self.lock();
-        let is_stale = |oldest: &T| stale(oldest, &entry);
-        while state.waiting.len() == self.capacity || state.waiting.front().is_some_and(is_stale) {
-            state.waiting.pop_front();
-            state.lost += 1;
-        }
+        let waiting = state.waiting.len();
+        let is_late = (state.waiting.front()).is_some_and(|oldest| stale(oldest, &entry));
+        let lost = match is_late {
+            true => waiting,
+            false => usize::from(waiting == self.capacity),
+        };
+        state.waiting.drain(..lost);
+        state.lost += lost as u64;
         state.waiting.push_back(entry);
         self.arrived.notify_one();
     }
@@ -137,13 +140,16 @@ mod tests {
     }
 
     #[test]
-    fn stale_entries_give_way_to_a_new_one() {
+    fn all_that_wait_give_way_where_the_oldest_is_stale() {
         let buffer = Newest::new(10);
-        for entry in [1, 2, 5, 3] {
+        for entry in [1, 2, 3, 4, 5, 6] {
             buffer.push_over(entry, |oldest, newest| oldest + 2 < *newest);
         }
-        assert_eq!(buffer.lost(), 2);
-        assert_eq!([buffer.pop(), buffer.pop()], [Some(5), Some(3)]);
+        assert_eq!(buffer.lost(), 3);
+        assert_eq!(
+            [buffer.pop(), buffer.pop(), buffer.pop()],
+            [Some(4), Some(5), Some(6)]
+        );
         assert_eq!(buffer.pop_within(Duration::from_millis(1)), None);
     }
 

@@ -71,20 +71,26 @@ impl ParameterServices {
     /// If ROS 2 refuses to publish.
     pub fn serve(&mut self, now: &Time) -> r2r::Result<bool> {
         self.queries.serve(&self.settings);
-        let before = self.settings.clone();
+        // This is asked at each sample, and settings hold the whole description of the robot: copied where they may change.
+        let mut before = None;
         let settings = &mut self.settings;
         answer(&mut self.set, |request| {
+            before.get_or_insert_with(|| settings.clone());
             let mut set = |parameter: &Parameter| change(settings, std::slice::from_ref(parameter));
             SetParameters::Response {
                 results: request.parameters.iter().map(&mut set).collect(),
             }
         });
         answer(&mut self.set_atomically, |request| {
+            before.get_or_insert_with(|| settings.clone());
             SetParametersAtomically::Response {
                 result: change(settings, &request.parameters),
             }
         });
-        let changed = changes(&before, &self.settings);
+        let changed = match before {
+            Some(before) => changes(&before, &self.settings),
+            None => return Ok(false),
+        };
         if changed.is_empty() {
             return Ok(false);
         }

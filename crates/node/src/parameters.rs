@@ -88,6 +88,10 @@ pub fn to_message(value: &Value) -> ParameterMessage {
             message.string_value.clone_from(value);
             kind::STRING
         }
+        Value::Sequence(values) if values.first().is_some_and(Value::is_i64) => {
+            message.integer_array_value = values.iter().filter_map(Value::as_i64).collect();
+            kind::INTEGER_ARRAY
+        }
         Value::Sequence(values) if values.first().is_some_and(Value::is_number) => {
             message.double_array_value = values.iter().filter_map(Value::as_f64).collect();
             kind::DOUBLE_ARRAY

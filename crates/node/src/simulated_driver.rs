@@ -1,6 +1,6 @@
 //! A driver without a robot: the iiwa that ships with the project moves, touches something and reports positions and
 //! external torques, with the truth as markers. A simulated trial is played forth and back for ever, so that nothing
-//! jumps.
+//! jumps. With the parameter `samples`, so many are sent, as soon as somebody listens to both topics.
 
 mod truth_markers;
 
@@ -21,6 +21,8 @@ use r2r::{Publisher, QosProfile};
 
 const MOST_RATE_HZ: f64 = 1000.0;
 const TRUTH_PERIOD: Duration = Duration::from_millis(33);
+/// From the first listener on, until the middleware on both sides knows the other.
+const MATCHING: Duration = Duration::from_millis(500);
 
 fn main() -> ExitCode {
     process::log();
@@ -38,6 +40,7 @@ fn start() -> anyhow::Result<(Driver, Arc<AtomicBool>)> {
     let stop = process::watch_signals()?;
     let mut node = process::create_node("simulated_driver")?;
     let scenario = read_scenario(&node)?;
+    let samples = read_samples(&node)?;
     let robot = iiwa14(&LoadOptions::default())?;
     let trial = simulate(&robot, &scenario)?;
     tracing::info!(
@@ -56,6 +59,7 @@ fn start() -> anyhow::Result<(Driver, Arc<AtomicBool>)> {
         _node: node,
         robot,
         trial,
+        samples,
     };
     Ok((driver, stop))
 }
@@ -81,6 +85,14 @@ fn read_scenario(node: &r2r::Node) -> anyhow::Result<Scenario> {
     Ok(scenario)
 }
 
+/// How many samples to send; none: without end.
+fn read_samples(node: &r2r::Node) -> anyhow::Result<Option<usize>> {
+    let told = "parameter samples: expected a whole number, at least 0";
+    let samples = node.get_parameter::<Option<i64>>("samples").context(told)?;
+    let samples = usize::try_from(samples.unwrap_or(0)).context(told)?;
+    Ok((samples > 0).then_some(samples))
+}
+
 struct Driver {
     positions: Publisher<JointState>,
     torques: Publisher<JointState>,
@@ -90,15 +102,21 @@ struct Driver {
     _node: r2r::Node,
     robot: Robot,
     trial: Trial,
+    /// None: without end, whoever listens.
+    samples: Option<usize>,
 }
 
 impl Driver {
-    /// Reports until asked to stop.
+    /// Reports until asked to stop, or all samples are sent.
     fn run(&self, stop: &AtomicBool) -> anyhow::Result<()> {
+        if self.samples.is_some() {
+            self.wait_for_listeners(stop)?;
+        }
         let period = Duration::from_secs_f64(1.0 / self.trial.rate_hz);
         let mut due = Instant::now();
         let mut truth_due = due;
-        for index in forth_and_back(self.trial.samples.len()) {
+        let most = self.samples.unwrap_or(usize::MAX);
+        for index in forth_and_back(self.trial.samples.len()).take(most) {
             if process::stopped(stop) {
                 break;
             }
@@ -117,6 +135,18 @@ impl Driver {
                 None => due = Instant::now(),
             }
         }
+        Ok(())
+    }
+
+    fn wait_for_listeners(&self, stop: &AtomicBool) -> r2r::Result<()> {
+        let is_heard = |topic: &Publisher<JointState>| {
+            let listeners = topic.get_inter_process_subscription_count()?;
+            Ok::<_, r2r::Error>(listeners > 0)
+        };
+        while !(process::stopped(stop) || is_heard(&self.positions)? && is_heard(&self.torques)?) {
+            thread::sleep(Duration::from_millis(10));
+        }
+        thread::sleep(MATCHING);
         Ok(())
     }
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use palpate_filter::{Filter, Settings};
 use palpate_model::Robot;
-use palpate_node::{Newest, TimedSample};
+use palpate_node::{Newest, TimedSample, realtime};
 use r2r::QosProfile;
 
 use crate::clock::Clock;
@@ -48,6 +48,9 @@ pub fn run(
     let mut parameters = ParameterServices::new(node, settings, clock.now())?;
     while !stopped(stop) && at_work.as_ref().is_none_or(AtWork::goes_on) {
         node.spin_once(Duration::from_millis(20));
+        if let Some(at_work) = &mut at_work {
+            at_work.reader.drain(clock.now_ns());
+        }
         let now = clock.now();
         if parameters.serve(&now)?
             && let Some(at_work) = &mut at_work
@@ -69,9 +72,6 @@ pub fn run(
         }
         let orders = at_work.as_ref().map(|at_work| &at_work.orders);
         services.serve(orders, settings.input.tare_secs);
-        if let Some(at_work) = &mut at_work {
-            at_work.reader.drain(clock.now_ns());
-        }
         let refusal = descriptions.as_ref().and_then(Descriptions::refusal);
         let observed = at_work.as_ref().map(AtWork::observed);
         diagnostics.tell(&now, settings, observed, refusal)?;
@@ -152,7 +152,13 @@ impl AtWork {
         })?;
         let drawing = spawn("drawing", {
             let (robot, easel) = (Arc::clone(&robot), Arc::clone(&easel));
-            move || pictures.run(&robot, &easel)
+            let was_raised = settings.realtime.priority > 0;
+            move || {
+                if was_raised && let Err(refusal) = realtime::step_down() {
+                    tracing::warn!("drawing keeps its priority: {refusal}");
+                }
+                pictures.run(&robot, &easel)
+            }
         })?;
         Ok(Self {
             robot,
