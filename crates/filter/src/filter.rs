@@ -1,12 +1,15 @@
 //! The filter: one `update` a sample.
 
+use std::sync::OnceLock;
+
 use nalgebra::{Matrix3, Vector3};
 use palpate_model::{Kinematics, Robot};
 
+use crate::cloud::Cloud;
 use crate::detector::Detector;
 use crate::modes::ModeFinder;
 use crate::palpate::{MOST_JOINTS, PalpateFilter};
-use crate::paper::PaperFilter;
+use crate::paper::{PaperFilter, Stage};
 use crate::skin::Skin;
 use crate::step::Step;
 use crate::tare::Tare;
@@ -18,7 +21,12 @@ use crate::{
 /// The method chosen, with all that it knows of the present contact.
 enum Estimator {
     Paper(Box<PaperFilter>),
-    Palpate(Box<PalpateFilter>),
+    Palpate {
+        filter: Box<PalpateFilter>,
+        /// Its particles at the last sample, twice: as the outside sees them, and link by link.
+        particles: Vec<Particle>,
+        cloud: Cloud,
+    },
 }
 
 impl Estimator {
@@ -31,7 +39,11 @@ impl Estimator {
             }
             Method::Palpate => {
                 let parameters = parameters.palpate.clone();
-                Self::Palpate(Box::new(PalpateFilter::new(robot, parameters, seed)))
+                Self::Palpate {
+                    particles: Vec::with_capacity(parameters.hypotheses),
+                    cloud: Cloud::with_room(robot.links.len(), parameters.hypotheses),
+                    filter: Box::new(PalpateFilter::new(robot, parameters, seed)),
+                }
             }
         }
     }
@@ -39,27 +51,42 @@ impl Estimator {
     fn begin(&mut self) {
         match self {
             Self::Paper(filter) => filter.begin(),
-            Self::Palpate(filter) => filter.begin(),
+            Self::Palpate { filter, .. } => filter.begin(),
         }
     }
 
-    fn step(&mut self, step: &Step, stamp_ns: i64) {
+    /// Takes a sample in; returns the particles that follow from it, link by link.
+    fn step(&mut self, step: &Step, stamp_ns: i64) -> &Cloud {
         match self {
-            Self::Paper(filter) => filter.step(step, stamp_ns),
-            Self::Palpate(filter) => filter.step(step, stamp_ns),
+            Self::Paper(filter) => {
+                filter.step(step, stamp_ns);
+                filter.cloud()
+            }
+            Self::Palpate {
+                filter,
+                particles,
+                cloud,
+            } => {
+                filter.step(step, stamp_ns);
+                particles.clear();
+                filter.show(step, particles);
+                cloud.gather(particles);
+                cloud
+            }
         }
     }
 
     fn widen(&self, step: &Step, modes: &mut [Mode]) {
-        if let Self::Palpate(filter) = self {
+        if let Self::Palpate { filter, .. } = self {
             filter.widen(step, modes);
         }
     }
 
-    fn show(&mut self, step: &Step, cloud: &mut Vec<Particle>) {
+    /// The particles after the last step.
+    fn particles(&self) -> Vec<Particle> {
         match self {
-            Self::Paper(filter) => filter.show(step.skin, cloud),
-            Self::Palpate(filter) => filter.show(step, cloud),
+            Self::Paper(filter) => filter.particles(),
+            Self::Palpate { particles, .. } => particles.clone(),
         }
     }
 }
@@ -80,7 +107,8 @@ pub struct Filter {
     position_before: Vec<f64>,
     number: u64,
     seed: u64,
-    cloud: Vec<Particle>,
+    /// The particles, once somebody asked for them.
+    shown: OnceLock<Vec<Particle>>,
     estimate: ContactEstimate,
 }
 
@@ -99,7 +127,6 @@ impl Filter {
             skin = skin.with_bodies(robot);
         }
         check_paths(robot)?;
-        let count = parameters.particles;
         Ok(Self {
             detector: Detector::new(robot, &parameters.detector)?,
             tare: Tare::new(robot.dof()),
@@ -111,7 +138,7 @@ impl Filter {
             position_before: vec![0.0; robot.dof()],
             number: 0,
             seed,
-            cloud: Vec::with_capacity(count),
+            shown: OnceLock::new(),
             estimate: ContactEstimate {
                 stamp_ns: 0,
                 status: ContactStatus::NoContact,
@@ -134,7 +161,7 @@ impl Filter {
         self.carry_tare_on(sample.stamp_ns, measured);
         self.take_bias_out(measured);
         let in_contact = self.detector.detection().in_contact;
-        self.cloud.clear();
+        self.shown.take();
         self.estimate.modes.clear();
         if in_contact {
             if !was_in_contact {
@@ -153,16 +180,42 @@ impl Filter {
                 bias: self.detector.bias(),
                 number: self.number,
             };
-            self.estimator.step(&step, sample.stamp_ns);
-            self.estimator.show(&step, &mut self.cloud);
+            let cloud = self.estimator.step(&step, sample.stamp_ns);
             self.modes
-                .find(&self.cloud, &self.skin, &self.now, &mut self.estimate.modes);
+                .find(cloud, &self.skin, &self.now, &mut self.estimate.modes);
             self.estimator.widen(&step, &mut self.estimate.modes);
         }
         self.summarise(sample.stamp_ns, in_contact);
         self.position_before.copy_from_slice(&sample.position);
         self.number += 1;
         &self.estimate
+    }
+
+    /// Runs one stage of the paper's method again, on the particles as they are. For benchmarks.
+    #[doc(hidden)]
+    pub fn run_stage(&mut self, stage: Stage, sample: Admitted<'_>) {
+        let step = Step {
+            robot: &self.robot,
+            skin: &self.skin,
+            before: &self.now,
+            now: &self.now,
+            position_before: &self.position_before,
+            position: &sample.sample().position,
+            torque: &self.torque,
+            bias: self.detector.bias(),
+            number: self.number,
+        };
+        let Estimator::Paper(filter) = &mut self.estimator else {
+            return;
+        };
+        match stage {
+            Stage::Modes => {
+                let modes = &mut self.estimate.modes;
+                (self.modes).find(filter.cloud(), &self.skin, &self.now, modes);
+            }
+            _ => filter.run_stage(stage, &step),
+        }
+        self.number += 1;
     }
 
     fn summarise(&mut self, stamp_ns: i64, in_contact: bool) {
@@ -255,9 +308,12 @@ impl Filter {
         &self.now
     }
 
-    /// The particles after the last update. Empty without contact.
+    /// The particles after the last update. Empty without contact. Made when they are first asked for.
     pub fn particles(&self) -> &[Particle] {
-        &self.cloud
+        match self.estimate.status {
+            ContactStatus::NoContact => &[],
+            _ => self.shown.get_or_init(|| self.estimator.particles()),
+        }
     }
 
     /// What of each joint's torque, bias removed, the most probable contact's force does not explain, Nm (N for a
@@ -276,14 +332,18 @@ impl Filter {
 
     /// Effective sample size of the particles; 0 without contact.
     pub fn effective_sample_size(&self) -> f64 {
-        let squares: f64 = self.cloud.iter().map(|at| at.weight * at.weight).sum();
+        let squares: f64 = self
+            .particles()
+            .iter()
+            .map(|at| at.weight * at.weight)
+            .sum();
         if squares > 0.0 { 1.0 / squares } else { 0.0 }
     }
 
     /// Standard deviation of the particles' points about their mean, m, over all links; 0 without contact.
     pub fn spread(&self) -> f64 {
         let weighted = || {
-            self.cloud.iter().map(|at| {
+            self.particles().iter().map(|at| {
                 let root_from_link = self.now.root_from_link(at.link);
                 (at.weight, (root_from_link * at.point_in_link).coords)
             })
@@ -320,7 +380,7 @@ impl Filter {
     pub fn forget_contact(&mut self) {
         self.detector.forget_contact();
         self.estimator = Estimator::new(&self.robot, &self.parameters, self.seed);
-        self.cloud.clear();
+        self.shown.take();
         self.estimate.status = ContactStatus::NoContact;
         self.estimate.modes.clear();
     }

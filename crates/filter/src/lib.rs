@@ -1,5 +1,6 @@
 //! Where the contact is: a particle filter over the triangles of each link's mesh.
 
+mod cloud;
 mod detection;
 mod detector;
 mod estimate;
@@ -27,6 +28,8 @@ pub use estimate::{ContactEstimate, ContactStatus, Mode};
 pub use filter::Filter;
 pub use intake::{Admitted, Intake, IntakeCounts, Refusal};
 pub use palpate::PalpateParameters;
+#[doc(hidden)]
+pub use paper::Stage;
 pub use paper::{MotionModel, PaperParameters};
 pub use parameter_table::{PARAMETER_TABLE, ParameterRow};
 pub use parameters::{Method, ParameterError, Parameters};

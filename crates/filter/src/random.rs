@@ -3,9 +3,6 @@
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-/// Particles that share one random stream and one unit of parallel work.
-pub(crate) const CHUNK: usize = 256;
-
 /// What a stream is for: equal seed, step and chunk give unrelated numbers for each purpose.
 #[derive(Clone, Copy)]
 pub(crate) enum Purpose {

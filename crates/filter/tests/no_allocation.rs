@@ -31,12 +31,14 @@ fn contacts(robot: &Robot, count: usize) -> Vec<JointSample> {
     samples
 }
 
-fn parameters() -> Parameters {
-    Parameters {
+fn parameters(rate_hz: f64) -> Parameters {
+    let mut parameters = Parameters {
         method: Method::Paper,
         particles: 1000,
         ..Parameters::default()
-    }
+    };
+    parameters.paper.rate_hz = rate_hz;
+    parameters
 }
 
 /// Feeds samples; tells how many had a contact.
@@ -50,10 +52,10 @@ fn feed(filter: &mut Filter, intake: &mut Intake, samples: &[JointSample]) -> us
 }
 
 /// Allocations and reallocations in the last of some contacts, from its 20th sample until after its end.
-fn allocations(robot: &Robot) -> usize {
+fn allocations(robot: &Robot, rate_hz: f64) -> usize {
     let samples = contacts(robot, 4);
     let (before, counted) = samples.split_at(3 * 150 + 20);
-    let mut filter = Filter::new(robot, &parameters(), 1).unwrap();
+    let mut filter = Filter::new(robot, &parameters(rate_hz), 1).unwrap();
     let mut intake = Intake::new(robot.dof());
     feed(&mut filter, &mut intake, before);
     let region = Region::new(ALLOCATOR);
@@ -68,5 +70,12 @@ fn a_contact_in_steady_state_allocates_nothing() {
     let robot = iiwa14(&LoadOptions::default()).unwrap();
     // One thread, the pool's own: several would also count what the pool does for itself.
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(pool.install(|| allocations(&robot)), 0);
+    // A step for every tenth sample, and for each.
+    for rate_hz in [10.0, 1000.0] {
+        assert_eq!(
+            pool.install(|| allocations(&robot, rate_hz)),
+            0,
+            "{rate_hz}"
+        );
+    }
 }

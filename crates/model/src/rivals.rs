@@ -55,6 +55,11 @@ impl Rivals {
         }
     }
 
+    /// Greatest tan(φ / 2) beyond each edge of a triangle, in the units of [`Triangle::depths`]: above and below.
+    pub(crate) fn steepest(&self, index: usize) -> [[f64; 3]; 2] {
+        [self.steepest[2 * index], self.steepest[2 * index + 1]]
+    }
+
     /// Those around `triangle` (number `index`) that may come closer than `depths` inside of its edges do, to a point
     /// above or below it at this squared distance. None where the surface bends away from the point.
     #[inline]

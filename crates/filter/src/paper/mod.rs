@@ -1,59 +1,61 @@
 //! The filter of Bimbo, Pacchierotti, Tsagarakis and Prattichizzo, _Collision Detection and Isolation on a Robot using
 //! Joint Torque Sensing_ (IROS 2019), with its letters.
 
+mod bulk;
+mod draws;
 mod likelihood;
 mod motion;
+mod offspring;
 mod parameters;
 mod schedule;
+mod weights;
 mod window;
 
-use nalgebra::Point3;
+use nalgebra::{Unit, Vector3};
 use palpate_model::Robot;
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 use crate::Particle;
-use crate::random::{CHUNK, Purpose, stream};
-use crate::resample::{effective_sample_size, normalise, systematic};
-use crate::skin::Skin;
+use crate::cloud::{BLOCK, Block, Cloud, Column};
+use crate::random::{Purpose, stream};
 use crate::step::Step;
 
+use draws::Draws;
 use likelihood::LinkLikelihood;
 use motion::LinkMotion;
 pub use motion::MotionModel;
+use offspring::{Generation, Nursery};
 pub use parameters::PaperParameters;
 use schedule::Level;
+use weights::{BlockWeights, Weights};
 use window::Window;
 
-/// Relative spread of a fresh particle's force about the one that fits best.
-const FORCE_SPREAD: f64 = 0.2;
-
-/// The paper's state x = {n, p, F, K} of one particle, with its log weight.
+/// A part of the step, for benchmarks.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct State {
-    /// Link n.
-    link: u16,
-    /// Mesh triangle that p lies on.
-    triangle: u32,
-    /// Contact point p in the link's frame, m.
-    point: Point3<f64>,
-    /// Normal force F ≥ 0, N.
-    force: f64,
-    /// Contact stiffness K, N/m.
-    stiffness: f64,
-    log_weight: f64,
+pub enum Stage {
+    /// Random numbers for all particles.
+    Draws,
+    /// Predicted against measured torques of all particles.
+    Likelihood,
+    /// Both with the projections, as they are done in the step: in one pass.
+    PropagateAndReweight,
+    /// Common scale of all weights.
+    Normalise,
+    /// A new generation.
+    Resample,
+    /// Modes of the cloud.
+    Modes,
 }
 
-/// The paper's particle filter.
+/// The paper's particle filter. The state x = {n, p, F, K} of the particles is kept link by link.
 pub(crate) struct PaperFilter {
     parameters: PaperParameters,
     count: usize,
     seed: u64,
-    particles: Vec<State>,
-    offspring: Vec<State>,
-    weights: Vec<f64>,
-    chosen: Vec<u32>,
+    cloud: Cloud,
+    offspring: Cloud,
+    generation: Generation,
+    weights: Weights,
     likelihoods: Vec<LinkLikelihood>,
     motions: Vec<LinkMotion>,
     /// How far the joints have moved since contact began, rad or m.
@@ -63,16 +65,18 @@ pub(crate) struct PaperFilter {
 
 impl PaperFilter {
     pub(crate) fn new(robot: &Robot, parameters: PaperParameters, count: usize, seed: u64) -> Self {
+        let links = robot.links.len();
+        let cloud = Cloud::with_room(links, count);
         Self {
             parameters,
             count,
             seed,
-            particles: Vec::with_capacity(count),
-            offspring: Vec::with_capacity(count),
-            weights: Vec::with_capacity(count),
-            chosen: Vec::with_capacity(count),
-            likelihoods: vec![LinkLikelihood::default(); robot.links.len()],
-            motions: vec![LinkMotion::default(); robot.links.len()],
+            offspring: cloud.clone(),
+            generation: Generation::new(&cloud),
+            weights: Weights::new(&cloud),
+            cloud,
+            likelihoods: vec![LinkLikelihood::default(); links],
+            motions: vec![LinkMotion::default(); links],
             travelled: 0.0,
             window: Window::new(robot),
         }
@@ -81,19 +85,20 @@ impl PaperFilter {
     /// Forgets the last contact.
     pub(crate) fn begin(&mut self) {
         self.travelled = 0.0;
-        self.particles.clear();
+        self.cloud.clear();
         self.window.clear();
     }
 
     /// Takes a sample in, and makes a step by the mean of the samples since the last one when it is time.
     pub(crate) fn step(&mut self, sample: &Step, stamp_ns: i64) {
         self.window.add(stamp_ns, sample.position, sample.torque);
-        if !self.particles.is_empty() && self.window.length_secs() < 1.0 / self.parameters.rate_hz {
+        if !self.cloud.is_empty() && !self.window.is_full(self.parameters.rate_hz) {
             return;
         }
         let mut window = std::mem::take(&mut self.window);
-        window.close(sample.robot, self.particles.is_empty());
-        self.update(&window.step(sample));
+        window.close(sample.robot, self.cloud.is_empty());
+        // Into the pool once a step, not once a loop.
+        rayon::scope(|_| self.update(&window.step(sample)));
         self.window = window;
     }
 
@@ -102,19 +107,15 @@ impl PaperFilter {
         self.travelled += step.joint_motion();
         let level = Level::at(&self.parameters, self.travelled);
         self.condition(step);
-        if self.particles.is_empty() {
-            self.spread(step);
+        if self.cloud.is_empty() {
+            self.renew(step, self.count);
         }
-        self.propagate(step, &level);
-        self.reweight(step, &level);
-        normalise(
-            self.particles.iter().map(|particle| particle.log_weight),
-            &mut self.weights,
-        );
-        if effective_sample_size(&self.weights)
-            < self.parameters.resample_below * self.particles.len() as f64
+        self.propagate_and_reweight(step, &level);
+        self.weights.normalise(&mut self.cloud);
+        if self.weights.effective_sample_size() < self.parameters.resample_below * self.count as f64
         {
-            self.resample(step);
+            let fresh = self.parameters.fresh_share * self.count as f64;
+            self.renew(step, fresh.round() as usize);
         }
     }
 
@@ -126,101 +127,99 @@ impl PaperFilter {
         }
     }
 
-    /// Spreads all particles over the whole skin, as at the start of a contact.
-    fn spread(&mut self, step: &Step) {
-        let mut random = stream(self.seed, step.number, 0, Purpose::Spread);
-        let (likelihoods, parameters) = (&self.likelihoods, &self.parameters);
-        let fresh = |_| fresh(step.skin, likelihoods, parameters, &mut random);
-        self.particles.extend((0..self.count).map(fresh));
-    }
-
-    fn propagate(&mut self, step: &Step, level: &Level) {
-        let (motions, skin, seed, number) = (&self.motions, step.skin, self.seed, step.number);
-        self.particles
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .for_each(|(chunk, particles)| {
-                let mut random = stream(seed, number, chunk, Purpose::Propagate);
-                for particle in particles {
-                    let link = particle.link as usize;
-                    motions[link].propagate(particle, skin.surface(link), level, &mut random);
-                }
-            });
-    }
-
-    fn reweight(&mut self, step: &Step, level: &Level) {
-        let (likelihoods, skin) = (&self.likelihoods, step.skin);
-        self.particles.par_chunks_mut(CHUNK).for_each(|particles| {
-            for particle in particles {
-                let link = particle.link as usize;
-                let normal = skin.surface(link).normal(particle.triangle);
-                let squared =
-                    likelihoods[link].squared_error(&particle.point, &normal, particle.force);
-                // Eq. 5: p(z | x) = exp(−λ ‖τ_ext − τ̂‖²).
-                particle.log_weight -= level.lambda * squared;
+    /// Both in one pass over memory, block by block.
+    fn propagate_and_reweight(&mut self, step: &Step, level: &Level) {
+        let (motions, likelihoods) = (&self.motions, &self.likelihoods);
+        let (skin, seed, number) = (step.skin, self.seed, step.number);
+        let (starts, count, before) = (&self.cloud.starts, self.count, self.weights.largest());
+        let one = |index: usize, block: &mut Block, weights: &mut BlockWeights| {
+            let draws = Draws::new(level, &mut stream(seed, number, index, Purpose::Propagate));
+            let mut errors: Column = [0.0; BLOCK];
+            for run in Cloud::runs(starts, index) {
+                let range = run.range;
+                motions[run.link].propagate(block, range.clone(), skin.surface(run.link), &draws);
+                likelihoods[run.link].squared_errors(block, range, &mut errors);
             }
-        });
-    }
-
-    fn resample(&mut self, step: &Step) {
-        let mut random = stream(self.seed, step.number, 0, Purpose::Resample);
-        systematic(
-            &self.weights,
-            self.particles.len(),
-            random.random(),
-            &mut self.chosen,
-        );
-        self.offspring.clear();
-        self.offspring.extend(
-            self.chosen
-                .iter()
-                .map(|&parent| self.particles[parent as usize]),
-        );
-        let mut random = stream(self.seed, step.number, 0, Purpose::Fresh);
-        for particle in &mut self.offspring {
-            particle.log_weight = 0.0;
-            if random.random::<f64>() < self.parameters.fresh_share {
-                *particle = fresh(step.skin, &self.likelihoods, &self.parameters, &mut random);
-            }
-        }
-        std::mem::swap(&mut self.particles, &mut self.offspring);
-        self.weights.fill(1.0 / self.particles.len() as f64);
-    }
-
-    /// Writes the particles, with their weights, as the outside sees them.
-    pub(crate) fn show(&self, skin: &Skin, cloud: &mut Vec<Particle>) {
-        let show = |(state, &weight): (&State, &f64)| Particle {
-            link: state.link as usize,
-            point_in_link: state.point,
-            triangle: state.triangle,
-            normal_in_link: skin.surface(state.link as usize).normal(state.triangle),
-            force: state.force,
-            stiffness: state.stiffness,
-            weight,
+            let held = (count - index * BLOCK).min(BLOCK);
+            *weights = BlockWeights::reweight(block, held, &errors, level.lambda, before);
         };
-        cloud.extend(self.particles.iter().zip(&self.weights).map(show));
+        (self.cloud.blocks.par_iter_mut())
+            .zip(self.weights.blocks_mut())
+            .enumerate()
+            .for_each(|(index, (block, weights))| one(index, block, weights));
+    }
+
+    /// Makes a new generation with so many fresh particles; all weigh the same.
+    fn renew(&mut self, step: &Step, fresh: usize) {
+        let nursery = Nursery {
+            skin: step.skin,
+            likelihoods: &self.likelihoods,
+            parameters: &self.parameters,
+            seed: self.seed,
+            number: step.number,
+        };
+        let counts = [self.count - fresh, fresh];
+        (self.generation).fill(&self.cloud, &mut self.offspring, counts, &nursery);
+        std::mem::swap(&mut self.cloud, &mut self.offspring);
+        self.weights.equal();
+    }
+
+    /// Runs one stage by itself.
+    pub(crate) fn run_stage(&mut self, stage: Stage, step: &Step) {
+        let level = Level::at(&self.parameters, self.travelled);
+        match stage {
+            Stage::Draws => {
+                for index in 0..self.cloud.blocks.len() {
+                    let purpose = Purpose::Propagate;
+                    let mut random = stream(self.seed, step.number, index, purpose);
+                    std::hint::black_box(Draws::new(&level, &mut random));
+                }
+            }
+            Stage::Likelihood => {
+                let mut errors: Column = [0.0; BLOCK];
+                for (index, block) in self.cloud.blocks.iter().enumerate() {
+                    for run in Cloud::runs(&self.cloud.starts, index) {
+                        let likelihood = &self.likelihoods[run.link];
+                        likelihood.squared_errors(block, run.range, &mut errors);
+                    }
+                    std::hint::black_box(&errors);
+                }
+            }
+            Stage::PropagateAndReweight => self.propagate_and_reweight(step, &level),
+            Stage::Normalise => self.weights.normalise(&mut self.cloud),
+            Stage::Resample => {
+                let fresh = self.parameters.fresh_share * self.count as f64;
+                self.renew(step, fresh.round() as usize);
+            }
+            Stage::Modes => {}
+        }
+    }
+
+    /// The particles, with their weights.
+    pub(crate) fn cloud(&self) -> &Cloud {
+        &self.cloud
+    }
+
+    /// The particles as the outside sees them.
+    pub(crate) fn particles(&self) -> Vec<Particle> {
+        let links = 0..self.cloud.starts.len() - 1;
+        let of_link = |link| {
+            let blocks = self.cloud.of_link(link);
+            blocks.flat_map(move |(block, range)| range.map(move |at| shown(link, block, at)))
+        };
+        links.flat_map(of_link).collect()
     }
 }
 
-/// A particle anywhere on the skin, uniform by area, with a force about as large as the measured torques ask for there
-/// and any stiffness of the range given.
-fn fresh(
-    skin: &Skin,
-    likelihoods: &[LinkLikelihood],
-    parameters: &PaperParameters,
-    random: &mut impl Rng,
-) -> State {
-    let (link, place) = skin.sample(random.random());
-    let normal = skin.surface(link).normal(place.triangle);
-    let best_force = likelihoods[link].best_force(&place.point, &normal);
-    let spread = 1.0 + FORCE_SPREAD * random.sample::<f64, _>(StandardNormal);
-    let [low, high] = parameters.stiffness_range;
-    State {
-        link: link as u16,
-        triangle: place.triangle,
-        point: place.point,
-        force: (best_force * spread).clamp(0.0, parameters.force_max),
-        stiffness: low * (high / low).powf(random.random()),
-        log_weight: 0.0,
+fn shown(link: usize, block: &Block, at: usize) -> Particle {
+    let normal: Vector3<f64> = block.normal(at).cast();
+    Particle {
+        link,
+        point_in_link: block.point(at).cast().into(),
+        triangle: block.triangle[at],
+        normal_in_link: Unit::new_normalize(normal),
+        force: f64::from(block.force[at]),
+        stiffness: f64::from(block.stiffness[at]),
+        weight: f64::from(block.weight[at]) * block.scale,
     }
 }

@@ -1,14 +1,14 @@
 //! How a contact moves while the robot does: the paper's curvature model (its eq. 8 and figure 2) and the two models
 //! that its figure 4 compares with.
 
-use nalgebra::{Isometry3, Vector3};
-use palpate_model::Surface;
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
+use palpate_model::{Landing, Surface};
 use serde::{Deserialize, Serialize};
 
-use super::State;
-use super::schedule::Level;
+use super::draws::Draws;
+use crate::cloud::{BLOCK, Block, Column};
 use crate::step::Step;
 
 /// What the contact does between two samples.
@@ -24,69 +24,162 @@ pub enum MotionModel {
     World,
 }
 
-/// Smallest and largest radius of the obstacle's curvature, m (uniform in log space).
-const RADIUS_RANGE: [f64; 2] = [1e-3, 1.0];
+/// One particle in so many is projected anew each step, in turn: a walk from the last triangle does not see a place far
+/// away that is closer.
+const AUDIT: usize = 256;
+/// Forces (N) and stiffnesses (N/m) stay below this, whatever the noise.
+const MOST: f32 = 1e9;
 
 /// The motion model for one link between two samples.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct LinkMotion {
     model: MotionModel,
-    /// Takes a point fixed in the world from the link's frame before to the link's frame now.
-    now_from_before: Isometry3<f64>,
+    /// What a point fixed in the world moves by in the link's frame: (R − 1) p + t. As a difference, so that single
+    /// precision rounds the motion and not the place.
+    turn: Matrix3<f32>,
+    shift: Vector3<f32>,
+    /// Which particles of a block are audited in this step.
+    audited: usize,
+}
+
+impl Default for LinkMotion {
+    fn default() -> Self {
+        Self {
+            model: MotionModel::default(),
+            turn: Matrix3::zeros(),
+            shift: Vector3::zeros(),
+            audited: 0,
+        }
+    }
 }
 
 impl LinkMotion {
     pub(super) fn new(model: MotionModel, step: &Step, link: usize) -> Self {
         let root_from_before = step.before.root_from_link(link);
         let root_from_now = step.now.root_from_link(link);
+        let now_from_before = root_from_now.inv_mul(root_from_before);
+        let turn = now_from_before.rotation.to_rotation_matrix();
         Self {
             model,
-            now_from_before: root_from_now.inv_mul(root_from_before),
+            turn: (turn.into_inner() - Matrix3::identity()).cast(),
+            shift: now_from_before.translation.vector.cast(),
+            audited: (step.number % AUDIT as u64) as usize,
         }
     }
 
-    /// Moves one particle: the model, then noise on location, force and stiffness.
+    /// Moves the particles of a run: the model, then noise on location, force and stiffness.
     pub(super) fn propagate(
         &self,
-        particle: &mut State,
+        block: &mut Block,
+        range: Range<usize>,
         surface: &Surface,
-        level: &Level,
-        random: &mut impl Rng,
+        draws: &Draws,
     ) {
-        let normal = surface.normal(particle.triangle);
-        let mut noise = || random.sample::<f64, _>(StandardNormal);
-        let location_noise = Vector3::new(noise(), noise(), noise()) * level.location_noise;
-        let (force_noise, stiffness_noise) =
-            (noise() * level.force_noise, noise() * level.stiffness_noise);
-        // Noise along the normal would be undone by the projection.
-        let location_noise = location_noise - normal.into_inner() * normal.dot(&location_noise);
+        // So that the compiler knows that every index is within a column.
+        let range = range.start..range.end.min(BLOCK);
         match self.model {
-            MotionModel::Link => {
-                self.place(particle, surface, particle.point.coords + location_noise)
-            }
+            MotionModel::Link => {}
             MotionModel::World => {
-                let moved = self.now_from_before * particle.point;
-                self.place(particle, surface, moved.coords + location_noise);
+                for at in range.clone() {
+                    block.set_point(at, &self.moved(block.point(at)));
+                }
             }
-            MotionModel::Curvature => {
-                let [least, most] = RADIUS_RANGE;
-                let radius = least * (most / least).powf(random.random());
-                let centre_before = particle.point + normal.into_inner() * radius;
-                let centre = self.now_from_before * centre_before;
-                self.place(particle, surface, centre.coords);
-                // Eq. 8: F_t = F_{t−1} + (r − d_t) K.
-                let distance = (particle.point - centre).norm();
-                particle.force += (radius - distance) * particle.stiffness;
-                self.place(particle, surface, particle.point.coords + location_noise);
-            }
+            MotionModel::Curvature => self.roll(block, range.clone(), surface, draws),
         }
-        particle.force = (particle.force + force_noise).max(0.0);
-        particle.stiffness *= stiffness_noise.exp();
+        let wanted = scattered(block, draws);
+        for at in range {
+            let query = Vector3::new(wanted[0][at], wanted[1][at], wanted[2][at]);
+            block.land(at, &surface.land(&query, block.triangle[at]));
+            block.force[at] = (block.force[at] + draws.force[at]).max(0.0).min(MOST);
+            block.stiffness[at] = (block.stiffness[at] * draws.stiffness[at]).min(MOST);
+        }
     }
 
-    fn place(&self, particle: &mut State, surface: &Surface, wanted: Vector3<f64>) {
-        let projected = surface.closest_point_from(&wanted.into(), particle.triangle);
-        particle.point = projected.point;
-        particle.triangle = projected.triangle;
+    /// Eq. 8: the contact is the point nearest to the centre of a sphere that rests in the world, and
+    /// F_t = F_{t−1} + (r − d_t) K.
+    fn roll(&self, block: &mut Block, range: Range<usize>, surface: &Surface, draws: &Draws) {
+        let centres = self.centres(block, draws);
+        for at in range.start..range.end.min(BLOCK) {
+            let centre = Vector3::new(centres[0][at], centres[1][at], centres[2][at]);
+            let touch = self.touch(surface, &centre, block.triangle[at], at);
+            block.force[at] += (draws.radius[at] - touch.distance) * block.stiffness[at];
+            block.land(at, &touch);
+        }
+    }
+
+    #[inline]
+    fn moved(&self, point: Vector3<f32>) -> Vector3<f32> {
+        point + (self.turn * point + self.shift)
+    }
+
+    /// Centres of the spheres in the link's frame now, m.
+    fn centres(&self, block: &Block, draws: &Draws) -> [Column; 3] {
+        let mut centres = [[0.0; BLOCK]; 3];
+        for at in 0..BLOCK {
+            let before = block.point(at) + block.normal(at) * draws.radius[at];
+            let now = self.moved(before);
+            (centres[0][at], centres[1][at], centres[2][at]) = (now.x, now.y, now.z);
+        }
+        centres
+    }
+
+    /// Where a ball about `centre` touches: walks from the last triangle, and for some particles searches anew.
+    #[inline]
+    fn touch(&self, surface: &Surface, centre: &Vector3<f32>, triangle: u32, at: usize) -> Landing {
+        let walked = surface.land(centre, triangle);
+        if at % AUDIT != self.audited {
+            return walked;
+        }
+        let searched = surface.land_anew(centre);
+        match searched.distance < walked.distance {
+            true => searched,
+            false => walked,
+        }
+    }
+}
+
+/// The points with noise along the surface, m: noise along the normal would be undone by the projection.
+fn scattered(block: &Block, draws: &Draws) -> [Column; 3] {
+    let mut wanted = [[0.0; BLOCK]; 3];
+    for at in 0..BLOCK {
+        let point = block.point(at);
+        let [along, across] = tangents(&block.normal(at));
+        let place = point + along * draws.location[0][at] + across * draws.location[1][at];
+        (wanted[0][at], wanted[1][at], wanted[2][at]) = (place.x, place.y, place.z);
+    }
+    wanted
+}
+
+/// Two unit vectors that are normal to a third and to each other (Duff et al., Building an Orthonormal Basis, Revisited,
+/// 2017).
+#[inline]
+fn tangents(n: &Vector3<f32>) -> [Vector3<f32>; 2] {
+    let sign = 1.0_f32.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    [
+        Vector3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+        Vector3::new(b, sign + n.y * n.y * a, -n.y),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tangents_and_normal_are_orthonormal() {
+        for [x, y, z] in [
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, -1.0],
+            [0.6, 0.0, -0.8],
+            [-1.0, 2.0, 0.3],
+        ] {
+            let normal = Vector3::new(x, y, z).normalize();
+            let [along, across] = tangents(&normal);
+            let basis = Matrix3::from_columns(&[normal, along, across]);
+            let off = basis.transpose() * basis - Matrix3::identity();
+            assert!(off.norm() < 1e-6, "{normal}");
+        }
     }
 }

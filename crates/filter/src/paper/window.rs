@@ -8,7 +8,8 @@ use crate::step::Step;
 #[derive(Default)]
 pub(super) struct Window {
     count: f64,
-    first_ns: i64,
+    /// When the last step was made, and when the last sample came.
+    closed_ns: i64,
     last_ns: i64,
     position_sum: Vec<f64>,
     torque_sum: Vec<f64>,
@@ -38,9 +39,6 @@ impl Window {
     }
 
     pub(super) fn add(&mut self, stamp_ns: i64, position: &[f64], torque: &[f64]) {
-        if self.count == 0.0 {
-            self.first_ns = stamp_ns;
-        }
         self.last_ns = stamp_ns;
         self.count += 1.0;
         for (sum, value) in self.position_sum.iter_mut().zip(position) {
@@ -51,10 +49,11 @@ impl Window {
         }
     }
 
-    /// Time that the samples cover, each for as long as the next comes after it, s.
-    pub(super) fn length_secs(&self) -> f64 {
-        let span = self.last_ns.saturating_sub(self.first_ns) as f64 * 1e-9;
-        span * self.count / (self.count - 1.0).max(1.0)
+    /// Whether a step is due for this many a second, to the nearest sample.
+    pub(super) fn is_full(&self, rate_hz: f64) -> bool {
+        let span_secs = self.last_ns.saturating_sub(self.closed_ns) as f64 * 1e-9;
+        let half_period_secs = 0.5 * span_secs / self.count.max(1.0);
+        span_secs + half_period_secs >= 1.0 / rate_hz
     }
 
     /// Makes the mean of the samples the present, and the present the past; at the first step both are the same.
@@ -79,6 +78,7 @@ impl Window {
             let [before, now] = &mut self.position;
             before.copy_from_slice(now);
         }
+        self.closed_ns = self.last_ns;
         self.clear();
     }
 

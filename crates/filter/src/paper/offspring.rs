@@ -1,0 +1,216 @@
+//! The next generation: children of the weighted particles, and fresh ones anywhere on the skin.
+//!
+//! Systematic resampling (Thrun, Burgard and Fox, Probabilistic Robotics, 2005, section 4.2.4) keeps the order of the
+//! particles; the fresh ones go to the end of each link's, so that those of a link stay side by side. Which child has
+//! which parent follows from sums over blocks, so that blocks of children are filled independently of each other.
+
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+
+use super::PaperParameters;
+use super::likelihood::LinkLikelihood;
+use crate::Particle;
+use crate::cloud::{BLOCK, Block, Cloud, Run};
+use crate::random::{Purpose, stream};
+use crate::skin::Skin;
+
+/// Relative spread of a fresh particle's force about the one that fits best.
+const FORCE_SPREAD: f64 = 0.2;
+
+/// Who the parents are, where the children go.
+#[derive(Default)]
+pub(super) struct Generation {
+    /// Sum of the weights before each block, and of all.
+    before_block: Vec<f64>,
+    /// Number of children before each link, and of all.
+    children: Vec<usize>,
+    /// Place of the systematic comb, in teeth: 0 … 1.
+    offset: f64,
+}
+
+/// What fresh particles are drawn by.
+pub(super) struct Nursery<'a> {
+    pub(super) skin: &'a Skin,
+    pub(super) likelihoods: &'a [LinkLikelihood],
+    pub(super) parameters: &'a PaperParameters,
+    pub(super) seed: u64,
+    pub(super) number: u64,
+}
+
+impl Generation {
+    /// Room for the parents that `cloud` has room for.
+    pub(super) fn new(cloud: &Cloud) -> Self {
+        Self {
+            before_block: Vec::with_capacity(cloud.blocks.len() + 1),
+            children: Vec::with_capacity(cloud.starts.len()),
+            offset: 0.0,
+        }
+    }
+
+    /// Fills `offspring` with so many children of `parents` and so many fresh particles, all of equal weight.
+    pub(super) fn fill(
+        &mut self,
+        parents: &Cloud,
+        offspring: &mut Cloud,
+        [children, fresh]: [usize; 2],
+        nursery: &Nursery,
+    ) {
+        let mut random = stream(nursery.seed, nursery.number, 0, Purpose::Resample);
+        self.offset = random.random();
+        self.count_children(parents, children);
+        let mut area = 0.0;
+        let links = offspring.starts.len() - 1;
+        for (link, start) in offspring.starts[..links].iter_mut().enumerate() {
+            let share = area / nursery.skin.area();
+            let fresh_before = (share * fresh as f64).round() as usize;
+            *start = self.children[link] + fresh_before.min(fresh);
+            area += nursery.skin.get(link).map_or(0.0, |surface| surface.area());
+        }
+        offspring.starts[links] = children + fresh;
+        offspring.fit();
+        let (starts, blocks) = (&offspring.starts, &mut offspring.blocks);
+        let scale = 1.0 / (children + fresh) as f64;
+        blocks
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(index, block)| {
+                block.weight.fill(1.0);
+                block.log_weight.fill(0.0);
+                block.scale = scale;
+                let mut random = stream(nursery.seed, nursery.number, index, Purpose::Fresh);
+                for run in Cloud::runs(starts, index) {
+                    let first = index * BLOCK + run.range.start - starts[run.link];
+                    self.fill_run(parents, block, &run, first, nursery, &mut random);
+                }
+            });
+    }
+
+    /// Sums the parents' weights, and shares the children out between the links.
+    fn count_children(&mut self, parents: &Cloud, children: usize) {
+        let mut sum = 0.0;
+        self.before_block.clear();
+        self.before_block.push(sum);
+        let blocks = parents.len().div_ceil(BLOCK);
+        for (index, block) in parents.blocks[..blocks].iter().enumerate() {
+            let end = (parents.len() - index * BLOCK).min(BLOCK);
+            for at in 0..end {
+                sum += weight(block, at);
+            }
+            self.before_block.push(sum);
+        }
+        self.children.clear();
+        for &start in &parents.starts {
+            let before = self.before(parents, start) / sum.max(f64::MIN_POSITIVE);
+            let teeth = (before * children as f64 - self.offset).ceil().max(0.0) as usize;
+            self.children.push(teeth.min(children));
+        }
+        if let Some(end) = self.children.last_mut() {
+            *end = children;
+        }
+    }
+
+    /// Sum of the weights of the parents before this one.
+    fn before(&self, parents: &Cloud, index: usize) -> f64 {
+        let (block, at) = (index / BLOCK, index % BLOCK);
+        if index == parents.len() {
+            return self.total();
+        }
+        let within = (0..at).map(|at| weight(&parents.blocks[block], at));
+        within.fold(self.before_block[block], |sum, weight| sum + weight)
+    }
+
+    fn total(&self) -> f64 {
+        self.before_block.last().copied().unwrap_or(0.0)
+    }
+
+    /// Fills those places of a block that belong to one link; `first` is the number among the link's particles of the
+    /// first one.
+    fn fill_run(
+        &self,
+        parents: &Cloud,
+        block: &mut Block,
+        run: &Run,
+        first: usize,
+        nursery: &Nursery,
+        random: &mut impl Rng,
+    ) {
+        let [before, after] = [run.link, run.link + 1].map(|link| self.children[link]);
+        let children = (after - before).saturating_sub(first).min(run.range.len());
+        let middle = run.range.start + children;
+        if children > 0 {
+            let tooth = self.total() / self.children.last().copied().unwrap_or(1) as f64;
+            let last = parents.starts[run.link + 1] - 1;
+            let mut wanted = (before + first) as f64 + self.offset;
+            let mut parent = Parent::at(self, parents, wanted * tooth);
+            for at in run.range.start..middle {
+                parent.advance(self, parents, wanted * tooth);
+                let index = parent.index.clamp(parents.starts[run.link], last);
+                block.copy(at, &parents.blocks[index / BLOCK], index % BLOCK);
+                wanted += 1.0;
+            }
+        }
+        for at in middle..run.range.end {
+            block.set(at, &nursery.fresh(run.link, random));
+            block.weight[at] = 1.0;
+        }
+    }
+}
+
+/// A parent, and the sum of the weights up to and with it.
+struct Parent {
+    index: usize,
+    cumulative: f64,
+}
+
+impl Parent {
+    /// The first one of the block in which the sum reaches `wanted`.
+    fn at(generation: &Generation, parents: &Cloud, wanted: f64) -> Self {
+        let ends = &generation.before_block[1..];
+        let block = ends
+            .partition_point(|&end| end < wanted)
+            .min(ends.len() - 1);
+        Self {
+            index: block * BLOCK,
+            cumulative: generation.before_block[block] + weight(&parents.blocks[block], 0),
+        }
+    }
+
+    /// The first one from here on at which the sum reaches `wanted`.
+    fn advance(&mut self, generation: &Generation, parents: &Cloud, wanted: f64) {
+        while self.cumulative < wanted && self.index + 1 < parents.len() {
+            self.index += 1;
+            let (block, at) = (self.index / BLOCK, self.index % BLOCK);
+            if at == 0 {
+                self.cumulative = generation.before_block[block];
+            }
+            self.cumulative += weight(&parents.blocks[block], at);
+        }
+    }
+}
+
+fn weight(block: &Block, at: usize) -> f64 {
+    f64::from(block.weight[at]) * block.scale
+}
+
+impl Nursery<'_> {
+    /// A particle anywhere on a link, uniform by area, with a force about as large as the measured torques ask for there
+    /// and any stiffness of the range given.
+    fn fresh(&self, link: usize, random: &mut impl Rng) -> Particle {
+        let surface = self.skin.surface(link);
+        let place = surface.sample(random.random());
+        let normal = surface.normal(place.triangle);
+        let best_force = self.likelihoods[link].best_force(&place.point, &normal);
+        let spread = 1.0 + FORCE_SPREAD * random.sample::<f64, _>(StandardNormal);
+        let [low, high] = self.parameters.stiffness_range;
+        Particle {
+            link,
+            point_in_link: place.point,
+            triangle: place.triangle,
+            normal_in_link: normal,
+            force: (best_force * spread).clamp(0.0, self.parameters.force_max),
+            stiffness: low * (high / low).powf(random.random()),
+            weight: 1.0,
+        }
+    }
+}
