@@ -53,9 +53,10 @@ def bag(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def parameters(tmp_path_factory):
-    """Few particles, for speed, and a wait so long that nothing is lost, however slow the machine is."""
+    """Few particles, for speed, and always as many; a wait so long that nothing is lost, however slow the machine is."""
     path = tmp_path_factory.mktemp("parameters") / "parameters.yaml"
-    values = {"filter.palpate.hypotheses": PARTICLES, "input.max_wait_secs": 3600, "seed": 5}
+    hypotheses = {"filter.palpate.hypotheses": PARTICLES, "filter.palpate.min_hypotheses": PARTICLES}
+    values = {**hypotheses, "input.max_wait_secs": 3600, "seed": 5}
     lines = [f"    {name}: {value}" for name, value in values.items()]
     path.write_text("\n".join(["/**:", "  ros__parameters:", *lines]))
     return path
