@@ -68,9 +68,10 @@ impl PlainSurface {
         let mut best = (f64::INFINITY, *query, 0);
         for &index in &self.around[nearest.item as usize] {
             let [a, b, c] = self.corners[index as usize].map(|corner| corner.coords);
-            let at = Vector3::from(query.coords);
             let triangle = Triangle::new(glam(a), glam(b), glam(c));
-            let point = triangle.project_local_point(glam(at), false).point;
+            let point = triangle
+                .project_local_point(glam(query.coords), false)
+                .point;
             let point = Point3::new(point.x, point.y, point.z);
             let squared = (point - query).norm_squared();
             if squared < best.0 {

@@ -11,7 +11,7 @@ const ROUND: f32 = 12_582_912.0;
 /// eˣ to 3 × 10⁻⁷ of itself, for 2⁻⁶⁰ to 2⁶⁰; beyond, these.
 #[inline]
 pub(super) fn exp(x: f32) -> f32 {
-    let power = (x * LOG2_E).max(-60.0).min(60.0);
+    let power = (x * LOG2_E).clamp(-60.0, 60.0);
     let rounded = power + ROUND;
     let rest = (power - (rounded - ROUND)) * LN_2;
     // Taylor's series for |rest| ≤ ln 2 / 2.

@@ -57,8 +57,9 @@ fn bits(random: &mut impl Rng) -> [u32; BLOCK] {
 fn normals(random: &mut impl Rng) -> [Column; 2] {
     let (lengths, angles) = (bits(random), bits(random));
     let (mut first, mut second) = ([0.0; BLOCK], [0.0; BLOCK]);
-    for at in 0..BLOCK {
-        (first[at], second[at]) = bulk::normals(lengths[at], angles[at]);
+    let columns = first.iter_mut().zip(&mut second);
+    for ((first, second), (length, angle)) in columns.zip(lengths.into_iter().zip(angles)) {
+        (*first, *second) = bulk::normals(length, angle);
     }
     [first, second]
 }

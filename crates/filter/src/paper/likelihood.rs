@@ -54,13 +54,8 @@ impl LinkLikelihood {
         for group in range.start / 8..range.end.div_ceil(8) {
             let first = group * 8;
             let squared = self.squared_error(block, group).to_array();
-            if range.start <= first && first + 8 <= range.end {
-                errors[first..first + 8].copy_from_slice(&squared);
-                continue;
-            }
-            for at in range.start.max(first)..range.end.min(first + 8) {
-                errors[at] = squared[at - first];
-            }
+            let (start, end) = (range.start.max(first), range.end.min(first + 8));
+            errors[start..end].copy_from_slice(&squared[start - first..end - first]);
         }
     }
 
@@ -82,8 +77,8 @@ impl LinkLikelihood {
         let mut squared = f32x8::splat(self.others);
         for (screw, &torque) in self.screws.iter().zip(&self.torques).take(self.joints) {
             let mut lever = w[0] * screw[0];
-            for row in 1..6 {
-                lever += w[row] * screw[row];
+            for (&part, &of_screw) in w.iter().zip(screw).skip(1) {
+                lever += part * of_screw;
             }
             let left = lever * force + torque;
             squared += left * left;

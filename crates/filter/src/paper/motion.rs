@@ -90,7 +90,7 @@ impl LinkMotion {
         for at in range {
             let query = Vector3::new(wanted[0][at], wanted[1][at], wanted[2][at]);
             block.land(at, &surface.land(&query, block.triangle[at]));
-            block.force[at] = (block.force[at] + draws.force[at]).max(0.0).min(MOST);
+            block.force[at] = (block.force[at] + draws.force[at]).clamp(0.0, MOST);
             block.stiffness[at] = (block.stiffness[at] * draws.stiffness[at]).min(MOST);
         }
     }

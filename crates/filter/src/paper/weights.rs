@@ -46,10 +46,10 @@ impl BlockWeights {
         block.weight[held..].fill(0.0);
         let (mut sum, mut squares) = ([0.0; LANES], [0.0; LANES]);
         for weights in block.weight.as_chunks::<LANES>().0 {
-            for lane in 0..LANES {
-                let weight = f64::from(weights[lane]);
-                sum[lane] += weight;
-                squares[lane] += weight * weight;
+            for ((sum, squares), &weight) in sum.iter_mut().zip(&mut squares).zip(weights) {
+                let weight = f64::from(weight);
+                *sum += weight;
+                *squares += weight * weight;
             }
         }
         Self {
