@@ -68,8 +68,8 @@ fn a_sphere_is_found_within_a_millimetre() {
 
 #[test]
 fn a_bias_is_solved_for() {
-    // Measured: medians 0.1 to 0.4 mm, worst 1.6 mm.
-    check(&errors("bias", "5,7"), 4, 2.0, 10.0);
+    // Known from before the contact, or not. Measured: medians 0.1 to 0.4 mm, worst 1.6 mm.
+    check(&errors("bias", "5,7"), 8, 2.0, 10.0);
 }
 
 #[test]
