@@ -97,7 +97,7 @@ impl ModeFinder {
             grid.clear();
             for (block, range) in cloud.of_link(link) {
                 for (group, mask) in eights(range).step_by(stride) {
-                    let weight = mask & eight(&block.weight, group) * block.scale as f32;
+                    let weight = mask & (eight(&block.weight, group) * block.scale as f32);
                     grid.add(place(block, group), weight.to_array());
                 }
             }
@@ -217,7 +217,7 @@ impl ModeFinder {
                 let place = place(block, group);
                 let held = self.held(ball, &place, mask);
                 if held.any() {
-                    let weight = held & eight(&block.weight, group) * -block.scale as f32;
+                    let weight = held & (eight(&block.weight, group) * -block.scale as f32);
                     grid.add(place, weight.to_array());
                 }
             }

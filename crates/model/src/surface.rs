@@ -508,7 +508,8 @@ mod tests {
                         .is_some(),
                 );
             }
-            assert!(strides > 1500, "{strides}");
+            // Enough that single precision is what is tested.
+            assert!(strides > 1000, "{strides}");
             let most = if dent == 0.0 { 0 } else { 20 };
             assert!(others <= most, "{others}");
         }

@@ -8,7 +8,7 @@ use palpate_model::{Landing, Surface};
 use serde::{Deserialize, Serialize};
 
 use super::draws::Draws;
-use crate::cloud::{BLOCK, Block, Column};
+use crate::cloud::{BLOCK, Block, Column, set_vector, vector};
 use crate::step::Step;
 
 /// What the contact does between two samples.
@@ -88,7 +88,7 @@ impl LinkMotion {
         }
         let wanted = scattered(block, draws);
         for at in range {
-            let query = Vector3::new(wanted[0][at], wanted[1][at], wanted[2][at]);
+            let query = vector(&wanted, at);
             block.land(at, &surface.land(&query, block.triangle[at]));
             block.force[at] = (block.force[at] + draws.force[at]).clamp(0.0, MOST);
             block.stiffness[at] = (block.stiffness[at] * draws.stiffness[at]).min(MOST);
@@ -100,7 +100,7 @@ impl LinkMotion {
     fn roll(&self, block: &mut Block, range: Range<usize>, surface: &Surface, draws: &Draws) {
         let centres = self.centres(block, draws);
         for at in range.start..range.end.min(BLOCK) {
-            let centre = Vector3::new(centres[0][at], centres[1][at], centres[2][at]);
+            let centre = vector(&centres, at);
             let touch = self.touch(surface, &centre, block.triangle[at], at);
             block.force[at] += (draws.radius[at] - touch.distance) * block.stiffness[at];
             block.land(at, &touch);
@@ -118,7 +118,7 @@ impl LinkMotion {
         for at in 0..BLOCK {
             let before = block.point(at) + block.normal(at) * draws.radius[at];
             let now = self.moved(before);
-            (centres[0][at], centres[1][at], centres[2][at]) = (now.x, now.y, now.z);
+            set_vector(&mut centres, at, &now);
         }
         centres
     }
@@ -145,7 +145,7 @@ fn scattered(block: &Block, draws: &Draws) -> [Column; 3] {
         let point = block.point(at);
         let [along, across] = tangents(&block.normal(at));
         let place = point + along * draws.location[0][at] + across * draws.location[1][at];
-        (wanted[0][at], wanted[1][at], wanted[2][at]) = (place.x, place.y, place.z);
+        set_vector(&mut wanted, at, &place);
     }
     wanted
 }
