@@ -39,7 +39,7 @@ use trial::{Cell, Setup, TrueRobots};
 /// Measure how good the estimates are, on simulated contacts or on recorded ones
 ///
 /// Without EXPERIMENT every experiment of --list is run; `targets` alone prints the table of measured values beside those
-/// to reach, and `bags` scores a folder of recorded trials, and `detection` tells how surely and soon contacts are noticed. Trials last 10 s at 100 Hz, in contact from the first sample.
+/// to reach, and `bags` scores a folder of recorded trials, and `detection` tells how surely and soon contacts are noticed. Trials last 10 s at 100 Hz, after 2 s without contact.
 /// Errors are position errors, the median over the last second. No trial runs twice, though several experiments use it;
 /// scenes and motions follow from seed, link and number of the trial, so that all conditions and methods are tried on the
 /// same ones. Results do not depend on the number of threads.

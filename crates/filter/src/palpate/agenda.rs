@@ -17,12 +17,12 @@ pub(super) enum Phase {
     Reweigh,
     /// One step of each peak.
     Climb,
-    /// Climb from beside the peaks.
-    Hop,
+    /// Climb from beside the peaks, so many rounds.
+    Hop(usize),
     /// Climb from the candidates of a scan, so many rounds, each with fewer of them.
     Scan(usize),
-    /// Climb as bars from the best balls.
-    Bars,
+    /// Climb as bars from the best balls, so many rounds.
+    Bars(usize),
     /// See what systematic errors would do to each peak.
     Sight,
     /// Move each particle, so many rounds.

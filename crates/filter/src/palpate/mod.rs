@@ -2,7 +2,7 @@
 //!
 //! A particle is an obstacle that rests in the world ([`obstacle`]); its weight is the evidence of the contact's whole
 //! history ([`memory`], [`evidence`]), with force, stiffness, friction and bias solved and the noise learned
-//! ([`noise`]). Peaks of the evidence are found by asking every triangle ([`scan`]) and climbing ([`peaks`]); Markov
+//! ([`noise`]). Peaks of the evidence are found by asking every triangle ([`scan`]) and climbing ([`search`]); Markov
 //! chain moves ([`moves`]) carry the particles between and around them, so that a wrong mode is left again. The work
 //! that a keyframe causes is spread over the samples until the next ([`agenda`]).
 
@@ -19,6 +19,7 @@ mod obstacle;
 mod parameters;
 mod peaks;
 mod scan;
+mod search;
 mod sight;
 mod sums;
 mod work;

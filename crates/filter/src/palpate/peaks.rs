@@ -15,6 +15,8 @@ pub(super) const STEPS: [f64; 4] = [1e-3, 1e-3, 0.1, 0.05];
 const PRIOR_PRECISION: [f64; 4] = [100.0, 100.0, 0.4, 1.0];
 /// Longest Newton step along the chart's axes.
 const REACH: [f64; 4] = [0.02, 0.02, 1.0, 0.5];
+/// A peak that moves by less than this share of a step rests.
+const AT_REST: f64 = 0.1;
 /// How much wider than Laplace's approximation the draws are, and which share of them, so that tails are reached.
 const WIDTHS: [(f64, f64); 2] = [(0.7, 1.1), (0.3, 3.0)];
 
@@ -26,6 +28,8 @@ pub(super) struct Peak {
     pub(super) touch: Touch,
     /// Log of the posterior mass by Laplace's approximation.
     pub(super) log_mass: f64,
+    /// Whether the last step hardly moved it.
+    pub(super) rests: bool,
     chart: Chart,
     precision: Matrix4<f64>,
     /// Lower Cholesky factor of the covariance.
@@ -46,6 +50,7 @@ impl Peak {
             log_mass: evidence.log,
             precision: Matrix4::identity(),
             root: Matrix4::identity(),
+            rests: false,
             sight: None,
             obstacle,
             evidence,
@@ -53,17 +58,8 @@ impl Peak {
         }
     }
 
-    /// Climbs by at most `most` Newton steps.
-    pub(super) fn climb(&mut self, history: &History, most: usize) {
-        for _ in 0..most {
-            if self.step(history) < 0.1 {
-                break;
-            }
-        }
-    }
-
-    /// One step of Newton's method with all derivatives by finite differences. Tells how far it moved, in steps.
-    fn step(&mut self, history: &History) -> f64 {
+    /// One step of Newton's method with all derivatives by finite differences.
+    pub(super) fn step(&mut self, history: &History) {
         *self = Self {
             sight: self.sight,
             ..Self::new(self.obstacle, history)
@@ -96,7 +92,7 @@ impl Peak {
         let scale = (0..4)
             .map(|i| newton[i].abs() / REACH[i])
             .fold(1.0, f64::max);
-        self.search_along(newton / scale, here, history)
+        self.rests = self.search_along(newton / scale, here, history) < AT_REST;
     }
 
     /// Laplace's approximation from the log posterior's second derivatives. Away from a maximum the curvature may
@@ -126,7 +122,7 @@ impl Peak {
         self.precision.determinant().max(f64::MIN_POSITIVE).ln()
     }
 
-    /// Goes as much of `way` as improves the posterior.
+    /// Goes as much of `way` as improves the posterior. Tells how far it moved, in steps.
     fn search_along(&mut self, way: Vector4<f64>, here: f64, history: &History) -> f64 {
         for share in [1.0, 0.4, 0.1] {
             let (obstacle, evidence, value) = self.try_at(&(way * share), history);

@@ -19,11 +19,10 @@ const DRAWN: usize = 3;
 const RADII: [f64; 3] = [0.006, 0.04, 0.25];
 /// Directions that a bar may start with.
 const DIRECTIONS: usize = 4;
-/// How many of the best go on in each round of a scan, and by how many Newton steps: successive halving (Jamieson and
-/// Talwalkar 2016).
-pub(super) const ROUNDS: [(usize, usize); 3] = [(usize::MAX, 1), (40, 2), (16, 5)];
-/// Newton steps of a bar's climb.
-pub(super) const BAR_CLIMB: usize = 8;
+/// How many of the best climbs go on after each round of a scan: successive halving (Jamieson and Talwalkar 2016).
+pub(super) const MOST_LEFT: [usize; 7] = [40, 40, 16, 16, 16, 16, 16];
+/// Rounds of the bars' climbs.
+pub(super) const BAR_ROUNDS: usize = 8;
 /// Ball peaks that bars are tried in the place of.
 pub(super) const BARS: usize = 8;
 
@@ -79,15 +78,13 @@ pub(super) fn ball(history: &History, candidate: &Candidate) -> Peak {
     best(RADII.map(start).into_iter())
 }
 
-/// Climbs as a bar from where a peak is.
-pub(super) fn climb_bar(history: &History, ball: &Peak) -> Peak {
+/// Where a climb as a bar from a peak begins.
+pub(super) fn bar(history: &History, ball: &Peak) -> Peak {
     let start = |direction: usize| {
         let turn = Some(std::f64::consts::PI * direction as f64 / DIRECTIONS as f64);
         Peak::new(history.reshaped(&ball.obstacle, turn), history)
     };
-    let mut peak = best((0..DIRECTIONS).map(start));
-    peak.climb(history, BAR_CLIMB);
-    peak
+    best((0..DIRECTIONS).map(start))
 }
 
 fn best(starts: impl Iterator<Item = Peak>) -> Peak {
@@ -164,7 +161,10 @@ fn of_link(history: &History, link: usize, random: &mut impl Rng) -> Vec<Candida
             )
         })
         .collect();
-    drawn.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let largest_first = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0);
+    if drawn.len() > DRAWN {
+        drawn.select_nth_unstable_by(DRAWN - 1, largest_first);
+    }
     minima.extend(
         drawn
             .iter()

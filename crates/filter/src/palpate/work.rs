@@ -9,29 +9,24 @@ use super::agenda::Phase;
 use super::history::{History, Place};
 use super::likeness::Likeness;
 use super::moves::Proposals;
-use super::obstacle::{Obstacle, RADIUS_RANGE};
-use super::peaks::{MOST, Peak, keep_best, keep_likely};
+use super::obstacle::RADIUS_RANGE;
+use super::peaks::Peak;
 use super::scan::Candidate;
-use super::{Hypothesis, PalpateFilter, PalpateParameters, crowd, history, scan, sight};
+use super::{Hypothesis, PalpateFilter, PalpateParameters, crowd, history, sight};
 use crate::random::{Purpose, stream};
 use crate::resample::{effective_sample_size, normalise, systematic};
 use crate::step::Step;
 
 /// Draws for each particle at the start.
 const FIRST_DRAWS: usize = 8;
-/// Climbs from new places at each keyframe, and the steps of each.
-const HOPS: usize = 16;
-const HOP_CLIMB: usize = 3;
-/// Every other one begins somewhat farther from one of so many best peaks, with any kind of obstacle,
-const FAR_HOPS_FROM: usize = 4;
-/// the others beside so many best peaks, and then at particles.
-const HOPS_FROM_PEAKS: usize = 6;
 /// Share of the particles below which their effective number may fall.
 const RESAMPLE_BELOW: f64 = 0.5;
 /// By this share their number may differ from what is asked for.
 const RESIZE_BEYOND: f64 = 0.25;
+/// What solving for force, stiffness, friction and bias costs beside the looks at the keyframes, in such looks.
+const SOLVING: usize = 4;
 /// Evaluations that one Newton step takes.
-const STEP_COST: usize = 14;
+pub(super) const STEP_COST: usize = 14;
 /// Evaluations that a look at the systematic errors takes.
 const SIGHT_COST: usize = 7;
 
@@ -39,10 +34,12 @@ const SIGHT_COST: usize = 7;
 #[derive(Default)]
 pub(super) struct Workbench {
     particles: Vec<Hypothesis>,
-    peaks: Vec<Peak>,
-    candidates: Vec<Candidate>,
-    /// Climbs of a scan that are still in the running.
-    climbs: Vec<Peak>,
+    /// Climbs that have come to their end,
+    pub(super) peaks: Vec<Peak>,
+    /// those that are still in the running,
+    pub(super) climbs: Vec<Peak>,
+    /// and where a scan begins some.
+    pub(super) candidates: Vec<Candidate>,
     /// Bins of the particles, with weights.
     occupied: Vec<((u16, u32), f64)>,
     /// The particles as they were before the moves.
@@ -66,18 +63,18 @@ impl PalpateFilter {
             Phase::Spread => self.spread(step),
             Phase::Reweigh => self.reweigh(step),
             Phase::Climb => self.climb(step),
-            Phase::Hop => self.hop(step),
+            Phase::Hop(round) => self.hop(step, round),
             Phase::Scan(round) => self.scan(step, round),
-            Phase::Bars => self.bars(step),
+            Phase::Bars(round) => self.bars(step, round),
             Phase::Sight => self.sight(step),
             Phase::Move(round) => self.mutate(step, round),
         }
     }
 
     /// The next portion of `units` that take `evaluations` of the whole history each.
-    fn portion(&mut self, units: usize, evaluations: usize) -> Range<usize> {
+    pub(super) fn portion(&mut self, units: usize, evaluations: usize) -> Range<usize> {
         self.agenda
-            .take(units, evaluations * self.memory.keyframes.len())
+            .take(units, evaluations * (self.memory.keyframes.len() + SOLVING))
     }
 
     /// Particles all over the robot, with any radius, as likely as the first keyframe says.
@@ -161,116 +158,10 @@ impl PalpateFilter {
         let history = history(step, &self.memory, &self.noise);
         self.peaks[portion]
             .par_iter_mut()
-            .for_each(|peak| peak.climb(&history, 1));
+            .for_each(|peak| peak.step(&history));
         if self.agenda.done == total {
-            self.agenda.enter(Phase::Hop);
+            self.agenda.enter(Phase::Hop(0));
         }
-    }
-
-    /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks and from particles.
-    fn hop(&mut self, step: &Step) {
-        let portion = self.portion(HOPS, STEP_COST * HOP_CLIMB);
-        let history = history(step, &self.memory, &self.noise);
-        let hop = |index| {
-            let mut peak = Peak::new(self.hop_start(index, &history), &history);
-            peak.climb(&history, HOP_CLIMB);
-            peak
-        };
-        let hops: Vec<Peak> = portion.into_par_iter().map(hop).collect();
-        self.bench.peaks.extend(hops);
-        if self.agenda.done == HOPS {
-            self.bench.candidates.clear();
-            if scan::is_due(self.keyframes) {
-                self.bench.candidates = scan::candidates(&history, self.seed, self.key);
-            }
-            self.agenda.enter(Phase::Scan(0));
-        }
-    }
-
-    /// Beside a peak, or a particle, seen as a ball or a bar.
-    fn hop_start(&self, index: usize, history: &History) -> Obstacle {
-        let mut random = stream(self.seed, self.key, index, Purpose::Hop);
-        if index.is_multiple_of(2) && !self.peaks.is_empty() {
-            let among = self.peaks.len().min(FAR_HOPS_FROM);
-            let peak = &self.peaks[random.random_range(0..among)];
-            return history.elsewhere(&peak.obstacle, &mut random);
-        }
-        let index = index / 2;
-        match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
-            Some(peak) => {
-                let own = peak.obstacle.likeness;
-                Obstacle {
-                    core: peak.draw(history, &mut random),
-                    likeness: match random.random::<bool>() {
-                        true => own.other(&mut random),
-                        false => own,
-                    },
-                    ..peak.obstacle
-                }
-            }
-            None => {
-                let particle = &self.particles[random.random_range(0..self.particles.len())];
-                let turn = std::f64::consts::PI * random.random::<f64>();
-                history.reshaped(&particle.obstacle, random.random::<bool>().then_some(turn))
-            }
-        }
-    }
-
-    /// Climbs from the candidates of a scan, if one was due; after each round, the best go on.
-    fn scan(&mut self, step: &Step, round: usize) {
-        let total = match round {
-            0 => self.bench.candidates.len(),
-            _ => self.bench.climbs.len(),
-        };
-        let (_, steps) = scan::ROUNDS[round];
-        let portion = self.portion(total, STEP_COST * steps);
-        let history = history(step, &self.memory, &self.noise);
-        if round == 0 {
-            let candidates = self.bench.candidates[portion.clone()].par_iter();
-            let begun = candidates.map(|candidate| scan::ball(&history, candidate));
-            self.bench.climbs.par_extend(begun);
-        }
-        let climbs = self.bench.climbs[portion].par_iter_mut();
-        climbs.for_each(|peak| peak.climb(&history, steps));
-        if self.agenda.done < total {
-            return;
-        }
-        match scan::ROUNDS.get(round + 1) {
-            Some(&(most, _)) => {
-                keep_best(&mut self.bench.climbs, most);
-                self.agenda.enter(Phase::Scan(round + 1));
-            }
-            None => {
-                self.bench.peaks.append(&mut self.bench.climbs);
-                self.renew_peaks();
-                self.agenda.enter(Phase::Bars);
-            }
-        }
-    }
-
-    /// After a scan, climbs as bars from where the best peaks are.
-    fn bars(&mut self, step: &Step) {
-        let total = if self.bench.candidates.is_empty() {
-            0
-        } else {
-            scan::BARS.min(self.peaks.len())
-        };
-        let portion = self.portion(total, STEP_COST * scan::BAR_CLIMB);
-        let history = history(step, &self.memory, &self.noise);
-        let peaks = self.peaks[portion].par_iter();
-        self.bench
-            .peaks
-            .par_extend(peaks.map(|peak| scan::climb_bar(&history, peak)));
-        if self.agenda.done == total {
-            self.renew_peaks();
-            self.agenda.enter(Phase::Sight);
-        }
-    }
-
-    fn renew_peaks(&mut self) {
-        self.peaks.append(&mut self.bench.peaks);
-        keep_best(&mut self.peaks, MOST);
-        keep_likely(&mut self.peaks);
     }
 
     /// Looks at what systematic errors would do to each peak.

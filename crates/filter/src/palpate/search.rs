@@ -1,0 +1,142 @@
+//! The search for better peaks after each keyframe: climbs from new places, one Newton step a round.
+
+use rand::RngExt;
+use rayon::prelude::*;
+
+use super::agenda::Phase;
+use super::history::History;
+use super::obstacle::Obstacle;
+use super::peaks::{MOST, Peak, keep_best, keep_likely};
+use super::work::STEP_COST;
+use super::{PalpateFilter, history, scan};
+use crate::random::{Purpose, stream};
+use crate::step::Step;
+
+/// Hops at each keyframe, and the Newton steps of each.
+const HOPS: usize = 16;
+const HOP_ROUNDS: usize = 3;
+/// Every other one begins somewhat farther from one of so many best peaks, with any kind of obstacle,
+const FAR_HOPS_FROM: usize = 4;
+/// the others beside so many best peaks, and then at particles.
+const HOPS_FROM_PEAKS: usize = 6;
+
+impl PalpateFilter {
+    /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks and from particles.
+    pub(super) fn hop(&mut self, step: &Step, round: usize) {
+        let start = |filter: &Self, index, history: &History| {
+            Peak::new(filter.hop_start(index, history), history)
+        };
+        if !self.climb_on(step, round, HOPS, start) {
+            return;
+        }
+        if round + 1 < HOP_ROUNDS {
+            return self.agenda.enter(Phase::Hop(round + 1));
+        }
+        self.bench.peaks.append(&mut self.bench.climbs);
+        self.bench.candidates.clear();
+        if scan::is_due(self.keyframes) {
+            let history = history(step, &self.memory, &self.noise);
+            self.bench.candidates = scan::candidates(&history, self.seed, self.key);
+        }
+        self.agenda.enter(Phase::Scan(0));
+    }
+
+    /// Climbs from the candidates of a scan, if one was due; after each round the best go on.
+    pub(super) fn scan(&mut self, step: &Step, round: usize) {
+        let start = |filter: &Self, index: usize, history: &History| {
+            scan::ball(history, &filter.bench.candidates[index])
+        };
+        if !self.climb_on(step, round, self.bench.candidates.len(), start) {
+            return;
+        }
+        if let Some(&most) = scan::MOST_LEFT.get(round) {
+            keep_best(&mut self.bench.climbs, most);
+            return self.agenda.enter(Phase::Scan(round + 1));
+        }
+        self.renew_peaks();
+        self.agenda.enter(Phase::Bars(0));
+    }
+
+    /// After a scan, climbs as bars from where the best peaks are.
+    pub(super) fn bars(&mut self, step: &Step, round: usize) {
+        let start = |filter: &Self, index: usize, history: &History| {
+            scan::bar(history, &filter.peaks[index])
+        };
+        let total = match self.bench.candidates.is_empty() {
+            true => 0,
+            false => scan::BARS.min(self.peaks.len()),
+        };
+        if !self.climb_on(step, round, total, start) {
+            return;
+        }
+        if round + 1 < scan::BAR_ROUNDS {
+            return self.agenda.enter(Phase::Bars(round + 1));
+        }
+        self.renew_peaks();
+        self.agenda.enter(Phase::Sight);
+    }
+
+    /// A portion of one round: in the first one so many climbs begin, and in each all go one step on. Tells whether the
+    /// round is done.
+    fn climb_on(
+        &mut self,
+        step: &Step,
+        round: usize,
+        starts: usize,
+        start: impl Fn(&Self, usize, &History) -> Peak + Sync,
+    ) -> bool {
+        let total = match round {
+            0 => starts,
+            _ => self.bench.climbs.len(),
+        };
+        let portion = self.portion(total, STEP_COST);
+        let history = history(step, &self.memory, &self.noise);
+        if round == 0 {
+            let begin = |index| start(self, index, &history);
+            let begun: Vec<Peak> = portion.clone().into_par_iter().map(begin).collect();
+            self.bench.climbs.extend(begun);
+        }
+        let climbs = self.bench.climbs[portion].par_iter_mut();
+        climbs
+            .filter(|peak| !peak.rests)
+            .for_each(|peak| peak.step(&history));
+        self.agenda.done == total
+    }
+
+    /// Beside a peak, or a particle, seen as a ball or a bar.
+    fn hop_start(&self, index: usize, history: &History) -> Obstacle {
+        let mut random = stream(self.seed, self.key, index, Purpose::Hop);
+        if index.is_multiple_of(2) && !self.peaks.is_empty() {
+            let among = self.peaks.len().min(FAR_HOPS_FROM);
+            let peak = &self.peaks[random.random_range(0..among)];
+            return history.elsewhere(&peak.obstacle, &mut random);
+        }
+        let index = index / 2;
+        match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
+            Some(peak) => {
+                let own = peak.obstacle.likeness;
+                Obstacle {
+                    core: peak.draw(history, &mut random),
+                    likeness: match random.random::<bool>() {
+                        true => own.other(&mut random),
+                        false => own,
+                    },
+                    ..peak.obstacle
+                }
+            }
+            None => {
+                let particle = &self.particles[random.random_range(0..self.particles.len())];
+                let turn = std::f64::consts::PI * random.random::<f64>();
+                history.reshaped(&particle.obstacle, random.random::<bool>().then_some(turn))
+            }
+        }
+    }
+
+    /// The climbs that came to their end are peaks like the others.
+    fn renew_peaks(&mut self) {
+        self.peaks.append(&mut self.bench.peaks);
+        self.peaks.append(&mut self.bench.climbs);
+        keep_best(&mut self.peaks, MOST);
+        keep_likely(&mut self.peaks);
+    }
+}
