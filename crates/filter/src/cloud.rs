@@ -13,6 +13,19 @@ pub(crate) const BLOCK: usize = 256;
 /// One number for each particle of a block.
 pub(crate) type Column = [f32; BLOCK];
 
+/// The vector of one particle, given a column for each axis.
+#[inline]
+pub(crate) fn vector(columns: &[Column; 3], at: usize) -> Vector3<f32> {
+    Vector3::new(columns[0][at], columns[1][at], columns[2][at])
+}
+
+#[inline]
+pub(crate) fn set_vector(columns: &mut [Column; 3], at: usize, vector: &Vector3<f32>) {
+    columns[0][at] = vector.x;
+    columns[1][at] = vector.y;
+    columns[2][at] = vector.z;
+}
+
 /// Places side by side, a column for each part of the state. Metres, newtons and N/m in the link's frame are good to a
 /// ten-millionth in single precision, and half the size passes through memory.
 #[derive(Clone)]
@@ -54,14 +67,12 @@ impl Default for Block {
 impl Block {
     #[inline]
     pub(crate) fn point(&self, at: usize) -> Vector3<f32> {
-        Vector3::from(self.point.each_ref().map(|column| column[at]))
+        vector(&self.point, at)
     }
 
     #[inline]
     pub(crate) fn set_point(&mut self, at: usize, point: &Vector3<f32>) {
-        self.point[0][at] = point.x;
-        self.point[1][at] = point.y;
-        self.point[2][at] = point.z;
+        set_vector(&mut self.point, at, point);
     }
 
     #[inline]
@@ -73,17 +84,15 @@ impl Block {
 
     #[inline]
     pub(crate) fn normal(&self, at: usize) -> Vector3<f32> {
-        Vector3::from(self.normal.each_ref().map(|column| column[at]))
+        vector(&self.normal, at)
     }
 
     #[inline]
     pub(crate) fn set_normal(&mut self, at: usize, normal: &Vector3<f32>) {
-        self.normal[0][at] = normal.x;
-        self.normal[1][at] = normal.y;
-        self.normal[2][at] = normal.z;
+        set_vector(&mut self.normal, at, normal);
     }
 
-    /// Makes the particle `at` one of another block, its log weight zero.
+    /// Makes the state of the particle `at` that of one of another block.
     pub(crate) fn copy(&mut self, at: usize, from: &Self, parent: usize) {
         self.set_point(at, &from.point(parent));
         self.set_normal(at, &from.normal(parent));
