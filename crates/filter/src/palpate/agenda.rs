@@ -19,6 +19,8 @@ pub(super) enum Phase {
     Climb,
     /// Climb from beside the peaks, so many rounds.
     Hop(usize),
+    /// Scan the links for candidates.
+    Ask,
     /// Climb from the candidates of a scan, so many rounds, each with fewer of them.
     Scan(usize),
     /// Climb as bars from the best balls, so many rounds.

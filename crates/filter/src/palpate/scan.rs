@@ -2,7 +2,6 @@
 
 use nalgebra::{Matrix6, Vector6};
 use rand::{Rng, RngExt};
-use rayon::prelude::*;
 
 use super::history::{History, Place};
 use super::likeness::Likeness;
@@ -46,12 +45,9 @@ pub(super) fn is_due(keyframes: usize) -> bool {
     FIRST.contains(&keyframes) || keyframes.is_multiple_of(EVERY)
 }
 
-/// Triangles of all links that a push on explains the newest torques.
-pub(super) fn candidates(history: &History, seed: u64, key: u64) -> Vec<Candidate> {
-    let links = history.skin.links();
-    let of_link =
-        |&link: &usize| of_link(history, link, &mut stream(seed, key, link, Purpose::Fresh));
-    let flat: Vec<Candidate> = links.par_iter().flat_map_iter(of_link).collect();
+/// Triangles of a link that a push on explains the newest torques, whatever the link is taken for.
+pub(super) fn candidates(history: &History, link: usize, seed: u64, key: u64) -> Vec<Candidate> {
+    let flat = of_link(history, link, &mut stream(seed, key, link, Purpose::Fresh));
     let taken_for = |likeness| {
         let candidate = move |&candidate: &Candidate| Candidate {
             likeness,
@@ -59,7 +55,7 @@ pub(super) fn candidates(history: &History, seed: u64, key: u64) -> Vec<Candidat
         };
         flat.iter().map(candidate)
     };
-    (taken_for(Likeness::Body).chain(taken_for(Likeness::Mesh))).collect()
+    Likeness::ALL.into_iter().flat_map(taken_for).collect()
 }
 
 /// Where a climb from a candidate as a ball begins.

@@ -19,6 +19,8 @@ const HOP_ROUNDS: usize = 3;
 const FAR_HOPS_FROM: usize = 4;
 /// the others beside so many best peaks, and then at particles.
 const HOPS_FROM_PEAKS: usize = 6;
+/// What asking a link's triangles costs, in looks at a keyframe: about what a sample of 1 kHz pays for.
+const ASKING: usize = 1000;
 
 impl PalpateFilter {
     /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks and from particles.
@@ -32,16 +34,29 @@ impl PalpateFilter {
         if round + 1 < HOP_ROUNDS {
             return self.agenda.enter(Phase::Hop(round + 1));
         }
-        self.bench.peaks.append(&mut self.bench.climbs);
+        self.renew_peaks();
         self.bench.candidates.clear();
-        if scan::is_due(self.keyframes) {
-            let history = history(step, &self.memory, &self.noise);
-            self.bench.candidates = scan::candidates(&history, self.seed, self.key);
-        }
-        self.agenda.enter(Phase::Scan(0));
+        self.agenda.enter(match scan::is_due(self.keyframes) {
+            true => Phase::Ask,
+            false => Phase::Sight,
+        });
     }
 
-    /// Climbs from the candidates of a scan, if one was due; after each round the best go on.
+    /// Asks the triangles of some links for the candidates of a scan.
+    pub(super) fn ask(&mut self, step: &Step) {
+        let links = step.skin.links();
+        let portion = self.agenda.take(links.len(), ASKING);
+        let history = history(step, &self.memory, &self.noise);
+        let (seed, key) = (self.seed, self.key);
+        let ask = |&link: &usize| scan::candidates(&history, link, seed, key);
+        let asked = links[portion].par_iter().flat_map_iter(ask);
+        self.bench.candidates.par_extend(asked);
+        if self.agenda.done == links.len() {
+            self.agenda.enter(Phase::Scan(0));
+        }
+    }
+
+    /// Climbs from the candidates of a scan; after each round the best go on.
     pub(super) fn scan(&mut self, step: &Step, round: usize) {
         let start = |filter: &Self, index: usize, history: &History| {
             scan::ball(history, &filter.bench.candidates[index])
@@ -62,11 +77,7 @@ impl PalpateFilter {
         let start = |filter: &Self, index: usize, history: &History| {
             scan::bar(history, &filter.peaks[index])
         };
-        let total = match self.bench.candidates.is_empty() {
-            true => 0,
-            false => scan::BARS.min(self.peaks.len()),
-        };
-        if !self.climb_on(step, round, total, start) {
+        if !self.climb_on(step, round, scan::BARS.min(self.peaks.len()), start) {
             return;
         }
         if round + 1 < scan::BAR_ROUNDS {
@@ -134,7 +145,6 @@ impl PalpateFilter {
 
     /// The climbs that came to their end are peaks like the others.
     fn renew_peaks(&mut self) {
-        self.peaks.append(&mut self.bench.peaks);
         self.peaks.append(&mut self.bench.climbs);
         keep_best(&mut self.peaks, MOST);
         keep_likely(&mut self.peaks);

@@ -34,9 +34,7 @@ const SIGHT_COST: usize = 7;
 #[derive(Default)]
 pub(super) struct Workbench {
     particles: Vec<Hypothesis>,
-    /// Climbs that have come to their end,
-    pub(super) peaks: Vec<Peak>,
-    /// those that are still in the running,
+    /// Climbs that go on,
     pub(super) climbs: Vec<Peak>,
     /// and where a scan begins some.
     pub(super) candidates: Vec<Candidate>,
@@ -49,7 +47,6 @@ pub(super) struct Workbench {
 impl Workbench {
     pub(super) fn clear(&mut self) {
         self.particles.clear();
-        self.peaks.clear();
         self.candidates.clear();
         self.climbs.clear();
     }
@@ -64,6 +61,7 @@ impl PalpateFilter {
             Phase::Reweigh => self.reweigh(step),
             Phase::Climb => self.climb(step),
             Phase::Hop(round) => self.hop(step, round),
+            Phase::Ask => self.ask(step),
             Phase::Scan(round) => self.scan(step, round),
             Phase::Bars(round) => self.bars(step, round),
             Phase::Sight => self.sight(step),
