@@ -24,7 +24,7 @@ const RESAMPLE_BELOW: f64 = 0.5;
 /// By this share their number may differ from what is asked for.
 const RESIZE_BEYOND: f64 = 0.25;
 /// What solving for force, stiffness, friction and bias costs beside the looks at the keyframes, in such looks.
-const SOLVING: usize = 4;
+const SOLVING: usize = 3;
 /// Evaluations that one Newton step takes.
 pub(super) const STEP_COST: usize = 14;
 /// Evaluations that a look at the systematic errors takes.
