@@ -93,7 +93,6 @@ fn millimetres(metres: f64) -> String {
     }
 }
 
-/// How well the contact is known now.
 /// How well the contact is known after an update.
 pub fn instant(filter: &Filter, truth: &Truth) -> Instant {
     let estimate = filter.estimate();
@@ -108,7 +107,6 @@ pub fn instant(filter: &Filter, truth: &Truth) -> Instant {
     }
 }
 
-/// All that the filter knows now, with the truth.
 /// All that is known after an update.
 pub fn moment(robot: &Robot, filter: &Filter, truth: &Truth, secs: f64) -> Moment {
     let (kinematics, estimate) = (filter.kinematics(), filter.estimate());

@@ -4,7 +4,7 @@ use anyhow::Result;
 use indicatif::ProgressBar;
 use palpate_filter::Filter;
 use palpate_model::JointSample;
-use palpate_sim::Trial;
+use palpate_sim::{Trial, Truth};
 
 use super::campaign::{Campaign, in_parallel};
 use super::condition;
@@ -17,7 +17,7 @@ use super::trial::{Cell, Setup};
 use crate::picture::{Instant, Moment, Picture};
 use crate::told;
 
-/// Times at which the particles are shown, s; the last one is the end.
+/// Times from the begin of contact at which the particles are shown, s; the last one is the end.
 const SHOWN_SECS: [f64; 2] = [0.0, 0.5];
 
 /// Runs the first trial of each link and adds its pictures to the report.
@@ -99,7 +99,10 @@ fn watch(setup: &Setup, cell: &Cell) -> Result<Watched> {
 struct Album<'a> {
     setup: &'a Setup,
     trial: &'a Trial,
+    /// Samples taken in.
+    seen: usize,
     moments: Vec<Moment>,
+    /// From the begin of contact on.
     history: Vec<Instant>,
 }
 
@@ -108,19 +111,27 @@ impl<'a> Album<'a> {
         Self {
             setup,
             trial,
+            seen: 0,
             moments: Vec::new(),
             history: Vec::new(),
         }
     }
 
     fn see(&mut self, filter: &Filter) {
-        let Some(truth) = self.trial.truth.get(self.history.len()) else {
+        let Some(truth) = self.trial.truth.get(self.seen) else {
             return;
         };
-        let instant = told::instant(filter, truth);
-        let secs = instant.secs;
-        self.history.push(instant);
-        let is_last = self.history.len() == self.trial.truth.len();
+        self.seen += 1;
+        let touches = |truth: &&Truth| truth.contact.is_some();
+        let Some(first) = self.trial.truth[..self.seen].iter().find(touches) else {
+            return;
+        };
+        let secs = (truth.stamp_ns - first.stamp_ns) as f64 * 1e-9;
+        self.history.push(Instant {
+            secs,
+            ..told::instant(filter, truth)
+        });
+        let is_last = self.seen == self.trial.truth.len();
         let due = SHOWN_SECS.get(self.moments.len());
         let is_due = due.is_some_and(|due| secs >= *due) && !filter.particles().is_empty();
         if is_due || is_last {
