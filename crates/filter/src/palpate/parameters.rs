@@ -10,8 +10,8 @@ use crate::ParameterError;
 pub struct PalpateParameters {
     /// Most hypotheses that are weighed by the whole history; these are the cloud's particles. Default 400.
     pub hypotheses: usize,
-    /// Fewest of them, where all agree about the place (KLD-sampling, Fox 2003, sets their number); no fewer than
-    /// `hypotheses` if that is less. Default 100.
+    /// Fewest of them, where all agree about the place: KLD-sampling (Fox 2003) sets their number. Where `hypotheses` is
+    /// less, that counts. Default 100.
     pub min_hypotheses: usize,
     /// Moves that each hypothesis tries after each keyframe. Default 4.
     pub rounds: usize,
