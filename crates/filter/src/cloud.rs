@@ -14,12 +14,12 @@ pub(crate) const BLOCK: usize = 256;
 pub(crate) type Column = [f32; BLOCK];
 
 /// The vector of one particle, given a column for each axis.
-#[inline]
+#[inline(always)]
 pub(crate) fn vector(columns: &[Column; 3], at: usize) -> Vector3<f32> {
     Vector3::new(columns[0][at], columns[1][at], columns[2][at])
 }
 
-#[inline]
+#[inline(always)]
 pub(crate) fn set_vector(columns: &mut [Column; 3], at: usize, vector: &Vector3<f32>) {
     columns[0][at] = vector.x;
     columns[1][at] = vector.y;
@@ -65,29 +65,29 @@ impl Default for Block {
 }
 
 impl Block {
-    #[inline]
+    #[inline(always)]
     pub(crate) fn point(&self, at: usize) -> Vector3<f32> {
         vector(&self.point, at)
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn set_point(&mut self, at: usize, point: &Vector3<f32>) {
         set_vector(&mut self.point, at, point);
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn land(&mut self, at: usize, place: &Landing) {
         self.set_point(at, &place.point);
         self.set_normal(at, &place.normal);
         self.triangle[at] = place.triangle;
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn normal(&self, at: usize) -> Vector3<f32> {
         vector(&self.normal, at)
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn set_normal(&mut self, at: usize, normal: &Vector3<f32>) {
         set_vector(&mut self.normal, at, normal);
     }

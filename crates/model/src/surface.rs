@@ -8,7 +8,7 @@ use nalgebra::{Point3, Unit, Vector3};
 use crate::TriangleMesh;
 use crate::adjacency::{Spoke, spokes_of, triangles_across_edges, triangles_around_vertices};
 use crate::lists::Lists;
-use crate::plate::{Plate, Side};
+use crate::plate::{OnEdge, Plate, Side};
 use crate::rivals::Rivals;
 use crate::triangle::{Feature, NONE, Triangle};
 
@@ -186,9 +186,10 @@ impl Surface {
             let plate = &self.plates[triangle as usize];
             match plate.side(query) {
                 Side::Inside(height) => {
+                    let normal = plate.normal();
                     return Some(Landing {
-                        point: query - plate.normal * height,
-                        normal: plate.normal,
+                        point: query - normal * height,
+                        normal,
                         triangle,
                         distance: height.abs(),
                     });
@@ -209,16 +210,36 @@ impl Surface {
     /// Where both triangles of an edge see the query beyond it.
     #[inline(never)]
     fn land_on_edge(&self, query: &Vector3<f32>, triangle: u32, edge: usize) -> Option<Landing> {
-        let ends = self.triangles[triangle as usize].edge(edge);
-        let ends = ends.map(|end| end.coords.cast());
         let plate = &self.plates[triangle as usize];
-        let point = plate.on_edge(edge, ends, query)?;
+        let point = match plate.on_edge(edge, query) {
+            OnEdge::Between(point) => point,
+            OnEdge::Beyond(corner) => self.on_corner(query, triangle, corner)?,
+            OnEdge::InReach => return None,
+        };
         Some(Landing {
             point,
-            normal: plate.normal,
+            normal: plate.normal(),
             triangle,
             distance: (query - point).norm(),
         })
+    }
+
+    /// A corner of a triangle, if no point around it is closer to the query.
+    fn on_corner(
+        &self,
+        query: &Vector3<f32>,
+        triangle: u32,
+        corner: usize,
+    ) -> Option<Vector3<f32>> {
+        let plate = &self.plates[triangle as usize];
+        let point = plate.corner(corner);
+        let away = (query - point).cast();
+        let vertex = self.triangles[triangle as usize].vertices[corner];
+        let mut spokes = self.spokes.get(vertex as usize).iter();
+        let edges = 1 << corner | 1 << ((corner + 2) % 3);
+        let is_closest = spokes.all(|spoke| spoke.edge.dot(&away) <= 0.0)
+            && !plate.has_rivals(&point, query, edges);
+        is_closest.then_some(point)
     }
 
     #[inline(never)]
@@ -241,7 +262,7 @@ impl Surface {
     fn landing(&self, query: &Vector3<f32>, found: SurfacePoint) -> Landing {
         Landing {
             point: found.point.coords.cast(),
-            normal: self.plates[found.triangle as usize].normal,
+            normal: self.plates[found.triangle as usize].normal(),
             triangle: found.triangle,
             distance: (found.point.coords - query.cast()).norm() as f32,
         }

@@ -48,16 +48,6 @@ impl Triangle {
         self.corner + self.edge_1 * along_1 + self.edge_2 * along_2
     }
 
-    /// The ends of an edge.
-    pub(crate) fn edge(&self, edge: usize) -> [Point3<f64>; 2] {
-        let corner = |index: usize| match index % 3 {
-            0 => self.corner,
-            1 => self.corner + self.edge_1,
-            _ => self.corner + self.edge_2,
-        };
-        [corner(edge), corner(edge + 1)]
-    }
-
     pub(crate) fn centroid(&self) -> Point3<f64> {
         self.at(1.0 / 3.0, 1.0 / 3.0)
     }

@@ -3,13 +3,11 @@
 
 use std::f32::consts::{FRAC_PI_2, LN_2, LOG2_E};
 
-use crate::cloud::Column;
-
 /// Adding and taking this away rounds to a whole number, which then stands in the lowest bits of the sum.
 const ROUND: f32 = 12_582_912.0;
 
 /// eˣ to 3 × 10⁻⁷ of itself, for 2⁻⁶⁰ to 2⁶⁰; beyond, these.
-#[inline]
+#[inline(always)]
 pub(super) fn exp(x: f32) -> f32 {
     let power = (x * LOG2_E).clamp(-60.0, 60.0);
     let rounded = power + ROUND;
@@ -32,7 +30,7 @@ pub(super) fn exp(x: f32) -> f32 {
 }
 
 /// ln x to 10⁻⁷ for positive x.
-#[inline]
+#[inline(always)]
 fn ln(x: f32) -> f32 {
     // x = 2ᵉ m with m from √½ to √2.
     const ROOT_HALF: i32 = 0x3f35_04f3;
@@ -47,13 +45,13 @@ fn ln(x: f32) -> f32 {
 }
 
 /// Uniform in (0, 1] by the upper 24 bits.
-#[inline]
+#[inline(always)]
 pub(super) fn uniform(bits: u32) -> f32 {
     ((bits >> 8) + 1) as i32 as f32 * (1.0 / 16_777_216.0)
 }
 
 /// Two standard normal numbers (Box and Muller 1958).
-#[inline]
+#[inline(always)]
 pub(super) fn normals(length_bits: u32, angle_bits: u32) -> (f32, f32) {
     let length = (ln(uniform(length_bits)) * -2.0).max(0.0).sqrt();
     // An angle within an eighth of a turn to both sides of an axis, then any of the four axes.
@@ -67,14 +65,6 @@ pub(super) fn normals(length_bits: u32, angle_bits: u32) -> (f32, f32) {
         _ => (cos * sign, sin),
     };
     (length * first, length * second)
-}
-
-/// Replaces every number of a column.
-#[inline]
-pub(super) fn map(column: &mut Column, function: impl Fn(f32) -> f32) {
-    column
-        .iter_mut()
-        .for_each(|value| *value = function(*value));
 }
 
 #[cfg(test)]

@@ -2,9 +2,10 @@
 
 use rand::Rng;
 
-use super::bulk::{self, exp, map, uniform};
+use super::bulk::{exp, normals, uniform};
 use super::schedule::Level;
 use crate::cloud::{BLOCK, Column};
+use crate::random::Bundle;
 
 /// Smallest and largest radius of the obstacle's curvature, m (uniform in log space).
 const RADIUS_RANGE: [f32; 2] = [1e-3, 1.0];
@@ -19,55 +20,75 @@ pub(super) struct Draws {
     pub(super) stiffness: Column,
     /// Radius of the obstacle's curvature, m.
     pub(super) radius: Column,
+    /// What the numbers are made of.
+    bits: [[u32; BLOCK]; 2],
 }
 
-impl Draws {
-    pub(super) fn new(level: &Level, random: &mut impl Rng) -> Self {
-        let [mut location_1, mut location_2] = normals(random);
-        let [mut force, mut stiffness] = normals(random);
-        let location_noise = level.location_noise as f32;
-        map(&mut location_1, |normal| normal * location_noise);
-        map(&mut location_2, |normal| normal * location_noise);
-        let force_noise = level.force_noise as f32;
-        map(&mut force, |normal| normal * force_noise);
-        let stiffness_noise = level.stiffness_noise as f32;
-        map(&mut stiffness, |normal| exp(normal * stiffness_noise));
-        let [least, most] = RADIUS_RANGE.map(f32::ln);
-        let mut radius = bits(random).map(uniform);
-        map(&mut radius, |uniform| exp(uniform * (most - least) + least));
+impl Default for Draws {
+    fn default() -> Self {
+        let zero = [0.0; BLOCK];
         Self {
-            location: [location_1, location_2],
-            force,
-            stiffness,
-            radius,
+            location: [zero; 2],
+            force: zero,
+            stiffness: zero,
+            radius: zero,
+            bits: [[0; BLOCK]; 2],
         }
     }
 }
 
-fn bits(random: &mut impl Rng) -> [u32; BLOCK] {
-    let mut bits = [0; _];
-    for pair in bits.as_chunks_mut::<2>().0 {
-        let both = random.next_u64();
-        *pair = [both as u32, (both >> 32) as u32];
+impl Draws {
+    /// Draws anew.
+    #[inline(always)]
+    pub(super) fn draw(&mut self, level: &Level, random: &mut impl Rng) {
+        let mut random = Bundle::new(random);
+        let [location_1, location_2] = &mut self.location;
+        draw_normals(&mut random, &mut self.bits, [location_1, location_2]);
+        scale(location_1, level.location_noise);
+        scale(location_2, level.location_noise);
+        let [force, stiffness] = [&mut self.force, &mut self.stiffness];
+        draw_normals(&mut random, &mut self.bits, [force, stiffness]);
+        scale(force, level.force_noise);
+        let stiffness_noise = level.stiffness_noise as f32;
+        for value in stiffness {
+            *value = exp(*value * stiffness_noise);
+        }
+        let [least, most] = RADIUS_RANGE.map(f32::ln);
+        random.fill(&mut self.bits[0]);
+        for (radius, &bits) in self.radius.iter_mut().zip(&self.bits[0]) {
+            *radius = exp(uniform(bits) * (most - least) + least);
+        }
     }
-    bits
+}
+
+#[inline(always)]
+fn scale(column: &mut Column, noise: f64) {
+    let noise = noise as f32;
+    column.iter_mut().for_each(|value| *value *= noise);
 }
 
 /// Two columns of standard normal numbers.
-fn normals(random: &mut impl Rng) -> [Column; 2] {
-    let (lengths, angles) = (bits(random), bits(random));
-    let (mut first, mut second) = ([0.0; BLOCK], [0.0; BLOCK]);
-    let columns = first.iter_mut().zip(&mut second);
-    for ((first, second), (length, angle)) in columns.zip(lengths.into_iter().zip(angles)) {
-        (*first, *second) = bulk::normals(length, angle);
+#[inline(always)]
+fn draw_normals(
+    random: &mut Bundle,
+    bits: &mut [[u32; BLOCK]; 2],
+    [first, second]: [&mut Column; 2],
+) {
+    random.fill(&mut bits[0]);
+    random.fill(&mut bits[1]);
+    for at in 0..BLOCK {
+        (first[at], second[at]) = normals(bits[0][at], bits[1][at]);
     }
-    [first, second]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::random::{Purpose, stream};
+
+    fn bundle(block: usize) -> Bundle {
+        Bundle::new(&mut stream(1, 0, block, Purpose::Propagate))
+    }
 
     /// Means of the first four powers, over many blocks.
     fn moments(mut columns: impl FnMut(usize) -> Vec<Column>) -> [f64; 4] {
@@ -81,7 +102,12 @@ mod tests {
 
     #[test]
     fn normals_have_the_moments_of_a_normal_distribution() {
-        let columns = |block| normals(&mut stream(1, 0, block, Purpose::Propagate)).to_vec();
+        let columns = |block| {
+            let mut columns = [[0.0; BLOCK]; 2];
+            let [first, second] = &mut columns;
+            draw_normals(&mut bundle(block), &mut [[0; BLOCK]; 2], [first, second]);
+            columns.to_vec()
+        };
         let [mean, variance, skew, kurtosis] = moments(columns);
         assert!(
             mean.abs() < 0.01 && (variance - 1.0).abs() < 0.02,
@@ -95,7 +121,11 @@ mod tests {
 
     #[test]
     fn uniforms_fill_the_interval_and_are_never_zero() {
-        let columns = |block| vec![bits(&mut stream(1, 0, block, Purpose::Propagate)).map(uniform)];
+        let columns = |block| {
+            let mut bits = [0; BLOCK];
+            bundle(block).fill(&mut bits);
+            vec![bits.map(uniform)]
+        };
         let [mean, square, ..] = moments(columns);
         assert!((mean - 0.5).abs() < 0.005 && (square - 1.0 / 3.0).abs() < 0.005);
         let all = (0..200).flat_map(columns).flatten();

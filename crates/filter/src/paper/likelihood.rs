@@ -3,9 +3,8 @@
 use std::ops::Range;
 
 use nalgebra::{Matrix6, Point3, Unit, Vector3, Vector6};
-use wide::f32x8;
 
-use crate::cloud::{Block, Column};
+use crate::cloud::{BLOCK, Block, Column, set_vector, vector};
 use crate::palpate::MOST_JOINTS;
 use crate::step::Step;
 
@@ -49,41 +48,32 @@ impl LinkLikelihood {
         of
     }
 
-    /// Writes ‖τ_ext − τ̂‖², Nm², of the particles of a run.
-    pub(super) fn squared_errors(&self, block: &Block, range: Range<usize>, errors: &mut Column) {
-        for group in range.start / 8..range.end.div_ceil(8) {
-            let first = group * 8;
-            let squared = self.squared_error(block, group).to_array();
-            let (start, end) = (range.start.max(first), range.end.min(first + 8));
-            errors[start..end].copy_from_slice(&squared[start - first..end - first]);
+    /// Writes ‖τ_ext − τ̂‖², Nm², of the particles of a run; `moment` is room for p × n̂.
+    #[inline(always)]
+    pub(super) fn squared_errors(
+        &self,
+        block: &Block,
+        range: Range<usize>,
+        moment: &mut [Column; 3],
+        errors: &mut Column,
+    ) {
+        let (point, normal) = (&block.point, &block.normal);
+        let range = range.start..range.end.min(BLOCK);
+        for at in range.clone() {
+            let moment_at = vector(point, at).cross(&vector(normal, at));
+            set_vector(moment, at, &moment_at);
+            errors[at] = self.others;
         }
-    }
-
-    /// Of eight particles side by side.
-    #[inline]
-    fn squared_error(&self, block: &Block, group: usize) -> f32x8 {
-        let eight = |column: &Column| f32x8::new(column.as_chunks().0[group]);
-        let [x, y, z] = block.point.each_ref().map(eight);
-        let [nx, ny, nz] = block.normal.each_ref().map(eight);
-        let force = eight(&block.force);
-        let w = [
-            nx,
-            ny,
-            nz,
-            y * nz - z * ny,
-            z * nx - x * nz,
-            x * ny - y * nx,
-        ];
-        let mut squared = f32x8::splat(self.others);
         for (screw, &torque) in self.screws.iter().zip(&self.torques).take(self.joints) {
-            let mut lever = w[0] * screw[0];
-            for (&part, &of_screw) in w.iter().zip(screw).skip(1) {
-                lever += part * of_screw;
+            for at in range.clone() {
+                let [x, y, z] = normal.each_ref().map(|column| column[at]);
+                let [u, v, w] = moment.each_ref().map(|column| column[at]);
+                let force_part = x * screw[0] + y * screw[1] + z * screw[2];
+                let lever = force_part + u * screw[3] + v * screw[4] + w * screw[5];
+                let left = lever * block.force[at] + torque;
+                errors[at] += left * left;
             }
-            let left = lever * force + torque;
-            squared += left * left;
         }
-        squared
     }
 
     /// The force F ≥ 0 (N) against n̂ at p that leaves the least error.

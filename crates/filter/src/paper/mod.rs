@@ -13,10 +13,11 @@ mod window;
 
 use nalgebra::{Unit, Vector3};
 use palpate_model::Robot;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::Particle;
-use crate::cloud::{BLOCK, Block, Cloud, Column};
+use crate::cloud::{BLOCK, Block, Cloud, Column, Run};
 use crate::random::{Purpose, stream};
 use crate::step::Step;
 
@@ -61,6 +62,7 @@ pub(crate) struct PaperFilter {
     /// How far the joints have moved since contact began, rad or m.
     travelled: f64,
     window: Window,
+    processor: Arch,
 }
 
 impl PaperFilter {
@@ -79,6 +81,7 @@ impl PaperFilter {
             motions: vec![LinkMotion::default(); links],
             travelled: 0.0,
             window: Window::new(robot),
+            processor: Arch::new(),
         }
     }
 
@@ -129,24 +132,26 @@ impl PaperFilter {
 
     /// Both in one pass over memory, block by block.
     fn propagate_and_reweight(&mut self, step: &Step, level: &Level) {
-        let (motions, likelihoods) = (&self.motions, &self.likelihoods);
-        let (skin, seed, number) = (step.skin, self.seed, step.number);
-        let (starts, count, before) = (&self.cloud.starts, self.count, self.weights.largest());
-        let one = |index: usize, block: &mut Block, weights: &mut BlockWeights| {
-            let draws = Draws::new(level, &mut stream(seed, number, index, Purpose::Propagate));
-            let mut errors: Column = [0.0; BLOCK];
-            for run in Cloud::runs(starts, index) {
-                let range = run.range;
-                motions[run.link].propagate(block, range.clone(), skin.surface(run.link), &draws);
-                likelihoods[run.link].squared_errors(block, range, &mut errors);
-            }
-            let held = (count - index * BLOCK).min(BLOCK);
-            *weights = BlockWeights::reweight(block, held, &errors, level.lambda, before);
+        let pass = Pass {
+            step,
+            level,
+            motions: &self.motions,
+            likelihoods: &self.likelihoods,
+            starts: &self.cloud.starts,
+            seed: self.seed,
+            largest_before: self.weights.largest(),
         };
         (self.cloud.blocks.par_iter_mut())
             .zip(self.weights.blocks_mut())
             .enumerate()
-            .for_each(|(index, (block, weights))| one(index, block, weights));
+            .for_each_init(Scratch::default, |scratch, (index, (block, weights))| {
+                *weights = self.processor.dispatch(OfBlock {
+                    pass: &pass,
+                    index,
+                    block,
+                    scratch,
+                });
+            });
     }
 
     /// Makes a new generation with so many fresh particles; all weigh the same.
@@ -169,18 +174,20 @@ impl PaperFilter {
         let level = Level::at(&self.parameters, self.travelled);
         match stage {
             Stage::Draws => {
+                let mut draws = Draws::default();
                 for index in 0..self.cloud.blocks.len() {
                     let purpose = Purpose::Propagate;
                     let mut random = stream(self.seed, step.number, index, purpose);
-                    std::hint::black_box(Draws::new(&level, &mut random));
+                    draws.draw(&level, &mut random);
+                    std::hint::black_box(&draws);
                 }
             }
             Stage::Likelihood => {
-                let mut errors: Column = [0.0; BLOCK];
+                let Scratch { places, errors, .. } = &mut Scratch::default();
                 for (index, block) in self.cloud.blocks.iter().enumerate() {
                     for run in Cloud::runs(&self.cloud.starts, index) {
                         let likelihood = &self.likelihoods[run.link];
-                        likelihood.squared_errors(block, run.range, &mut errors);
+                        likelihood.squared_errors(block, run.range, places, errors);
                     }
                     std::hint::black_box(&errors);
                 }
@@ -208,6 +215,76 @@ impl PaperFilter {
             blocks.flat_map(move |(block, range)| range.map(move |at| shown(link, block, at)))
         };
         links.flat_map(of_link).collect()
+    }
+}
+
+/// What all blocks share in one pass.
+struct Pass<'a> {
+    step: &'a Step<'a>,
+    level: &'a Level,
+    motions: &'a [LinkMotion],
+    likelihoods: &'a [LinkLikelihood],
+    starts: &'a [usize],
+    seed: u64,
+    largest_before: f32,
+}
+
+/// Room for what is needed of one block and no longer.
+struct Scratch {
+    draws: Draws,
+    places: [Column; 3],
+    errors: Column,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        let zero = [0.0; BLOCK];
+        Self {
+            draws: Draws::default(),
+            places: [zero; 3],
+            errors: zero,
+        }
+    }
+}
+
+/// One block in one pass. As a type of its own it is compiled for each kind of processor that it may run on; all must be
+/// inlined for that. The operations are the same and in the same order, and so are the bits.
+struct OfBlock<'a> {
+    pass: &'a Pass<'a>,
+    index: usize,
+    block: &'a mut Block,
+    scratch: &'a mut Scratch,
+}
+
+impl WithSimd for OfBlock<'_> {
+    type Output = BlockWeights;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> BlockWeights {
+        let Self {
+            pass,
+            index,
+            block,
+            scratch,
+        } = self;
+        let Scratch {
+            draws,
+            places,
+            errors,
+        } = scratch;
+        let number = pass.step.number;
+        draws.draw(
+            pass.level,
+            &mut stream(pass.seed, number, index, Purpose::Propagate),
+        );
+        for Run { link, range } in Cloud::runs(pass.starts, index) {
+            let surface = pass.step.skin.surface(link);
+            pass.motions[link].propagate(block, range.clone(), surface, draws, places);
+            pass.likelihoods[link].squared_errors(block, range, places, errors);
+        }
+        let count = pass.starts.last().copied().unwrap_or(0);
+        let held = (count - index * BLOCK).min(BLOCK);
+        BlockWeights::reweight(block, held, errors, pass.level.lambda, pass.largest_before)
     }
 }
 

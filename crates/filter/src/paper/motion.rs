@@ -67,13 +67,16 @@ impl LinkMotion {
         }
     }
 
-    /// Moves the particles of a run: the model, then noise on location, force and stiffness.
+    /// Moves the particles of a run: the model, then noise on location, force and stiffness. `places` is room for where
+    /// they would be off the surface.
+    #[inline(always)]
     pub(super) fn propagate(
         &self,
         block: &mut Block,
         range: Range<usize>,
         surface: &Surface,
         draws: &Draws,
+        places: &mut [Column; 3],
     ) {
         // So that the compiler knows that every index is within a column.
         let range = range.start..range.end.min(BLOCK);
@@ -84,12 +87,14 @@ impl LinkMotion {
                     block.set_point(at, &self.moved(block.point(at)));
                 }
             }
-            MotionModel::Curvature => self.roll(block, range.clone(), surface, draws),
+            MotionModel::Curvature => self.roll(block, range.clone(), surface, draws, places),
         }
-        let wanted = scattered(block, draws);
-        for at in range {
-            let query = vector(&wanted, at);
+        scatter(block, range.clone(), draws, places);
+        for at in range.clone() {
+            let query = vector(places, at);
             block.land(at, &surface.land(&query, block.triangle[at]));
+        }
+        for at in range {
             block.force[at] = (block.force[at] + draws.force[at]).clamp(0.0, MOST);
             block.stiffness[at] = (block.stiffness[at] * draws.stiffness[at]).min(MOST);
         }
@@ -97,34 +102,34 @@ impl LinkMotion {
 
     /// Eq. 8: the contact is the point nearest to the centre of a sphere that rests in the world, and
     /// F_t = F_{t−1} + (r − d_t) K.
-    fn roll(&self, block: &mut Block, range: Range<usize>, surface: &Surface, draws: &Draws) {
-        let centres = self.centres(block, draws);
-        for at in range.start..range.end.min(BLOCK) {
-            let centre = vector(&centres, at);
+    #[inline(always)]
+    fn roll(
+        &self,
+        block: &mut Block,
+        range: Range<usize>,
+        surface: &Surface,
+        draws: &Draws,
+        centres: &mut [Column; 3],
+    ) {
+        for at in range.clone() {
+            let before = block.point(at) + block.normal(at) * draws.radius[at];
+            set_vector(centres, at, &self.moved(before));
+        }
+        for at in range {
+            let centre = vector(centres, at);
             let touch = self.touch(surface, &centre, block.triangle[at], at);
             block.force[at] += (draws.radius[at] - touch.distance) * block.stiffness[at];
             block.land(at, &touch);
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn moved(&self, point: Vector3<f32>) -> Vector3<f32> {
         point + (self.turn * point + self.shift)
     }
 
-    /// Centres of the spheres in the link's frame now, m.
-    fn centres(&self, block: &Block, draws: &Draws) -> [Column; 3] {
-        let mut centres = [[0.0; BLOCK]; 3];
-        for at in 0..BLOCK {
-            let before = block.point(at) + block.normal(at) * draws.radius[at];
-            let now = self.moved(before);
-            set_vector(&mut centres, at, &now);
-        }
-        centres
-    }
-
     /// Where a ball about `centre` touches: walks from the last triangle, and for some particles searches anew.
-    #[inline]
+    #[inline(always)]
     fn touch(&self, surface: &Surface, centre: &Vector3<f32>, triangle: u32, at: usize) -> Landing {
         let walked = surface.land(centre, triangle);
         if at % AUDIT != self.audited {
@@ -139,20 +144,18 @@ impl LinkMotion {
 }
 
 /// The points with noise along the surface, m: noise along the normal would be undone by the projection.
-fn scattered(block: &Block, draws: &Draws) -> [Column; 3] {
-    let mut wanted = [[0.0; BLOCK]; 3];
-    for at in 0..BLOCK {
-        let point = block.point(at);
+#[inline(always)]
+fn scatter(block: &Block, range: Range<usize>, draws: &Draws, places: &mut [Column; 3]) {
+    for at in range {
         let [along, across] = tangents(&block.normal(at));
-        let place = point + along * draws.location[0][at] + across * draws.location[1][at];
-        set_vector(&mut wanted, at, &place);
+        let noise = along * draws.location[0][at] + across * draws.location[1][at];
+        set_vector(places, at, &(block.point(at) + noise));
     }
-    wanted
 }
 
 /// Two unit vectors that are normal to a third and to each other (Duff et al., Building an Orthonormal Basis, Revisited,
 /// 2017).
-#[inline]
+#[inline(always)]
 fn tangents(n: &Vector3<f32>) -> [Vector3<f32>; 2] {
     let sign = 1.0_f32.copysign(n.z);
     let a = -1.0 / (sign + n.z);

@@ -22,6 +22,7 @@ pub(super) struct BlockWeights {
 impl BlockWeights {
     /// Eq. 5: p(z | x) = exp(−λ ‖τ_ext − τ̂‖²), for the first `held` particles of a block, given the squared errors (Nm²)
     /// and the largest log weight before, which is taken off.
+    #[inline(always)]
     pub(super) fn reweight(
         block: &mut Block,
         held: usize,
@@ -60,6 +61,7 @@ impl BlockWeights {
     }
 }
 
+#[inline(always)]
 fn total(lanes: [f64; LANES]) -> f64 {
     lanes.into_iter().sum()
 }
