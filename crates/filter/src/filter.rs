@@ -400,3 +400,53 @@ fn check_paths(robot: &Robot) -> Result<(), ParameterError> {
         }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use palpate_model::{LoadOptions, iiwa14};
+    use palpate_sim::{Scenario, simulate};
+    use pulp::Arch;
+
+    use super::*;
+    use crate::{Intake, MotionModel};
+
+    /// The instructions that every processor has, and those of the one at hand.
+    #[test]
+    fn vector_instructions_change_no_bit() {
+        let robot = iiwa14(&LoadOptions::default()).unwrap();
+        let scenario = Scenario {
+            duration_secs: 0.4,
+            noise_fraction: 0.1,
+            ..Scenario::new("lbr_link_5")
+        };
+        let samples = simulate(&robot, &scenario).unwrap().samples;
+        let told = |motion_model, processor| {
+            let mut parameters = Parameters {
+                method: Method::Paper,
+                particles: 2100,
+                ..Parameters::default()
+            };
+            parameters.paper.motion_model = motion_model;
+            parameters.paper.rate_hz = 100.0;
+            let mut filter = Filter::new(&robot, &parameters, 1).unwrap();
+            match &mut filter.estimator {
+                Estimator::Paper(paper) => paper.run_on(processor),
+                Estimator::Palpate { .. } => unreachable!(),
+            }
+            let mut intake = Intake::new(robot.dof());
+            for sample in &samples {
+                filter.update(intake.admit(sample).unwrap());
+            }
+            format!("{:?}\n{:?}", filter.estimate(), filter.particles())
+        };
+        for model in [
+            MotionModel::Curvature,
+            MotionModel::Link,
+            MotionModel::World,
+        ] {
+            let plain = told(model, Arch::Scalar);
+            assert!(plain.contains("Mode {") && plain.contains("Particle {"));
+            assert!(told(model, Arch::new()) == plain, "{model:?}");
+        }
+    }
+}

@@ -179,7 +179,11 @@ impl ModeFinder {
             let mut of_block = [f32x8::ZERO; N];
             for (group, mask) in eights(range).step_by(stride) {
                 let place = place(block, group);
-                let weight = self.held(ball, &place, mask) & eight(&block.weight, group);
+                let held = self.held(ball, &place, mask);
+                if !held.any() {
+                    continue;
+                }
+                let weight = held & eight(&block.weight, group);
                 let offset = ball.offset(&place);
                 for (sum, summand) in
                     (of_block.iter_mut()).zip(summands(block, group, weight, offset))
@@ -197,13 +201,14 @@ impl ModeFinder {
     /// Which of some particles of the ball's link it holds, as a mask.
     #[inline]
     fn held(&self, ball: &Ball, place: &[f32x8; 3], mask: f32x8) -> f32x8 {
-        let earlier = self
-            .balls
-            .iter()
-            .filter(|earlier| earlier.link == ball.link);
-        earlier.fold(mask & ball.reaches(place), |held, earlier| {
-            held & !earlier.reaches(place)
-        })
+        let mut held = mask & ball.reaches(place);
+        if held.any() {
+            let earlier = self.balls.iter();
+            for earlier in earlier.filter(|earlier| earlier.link == ball.link) {
+                held &= !earlier.reaches(place);
+            }
+        }
+        held
     }
 
     /// Takes the weight that `ball` holds out of the search.

@@ -6,6 +6,7 @@
 //! Transforms are named `a_from_b`, quantities `x_in_a`; units are SI, angles radians, stamps integer nanoseconds.
 
 mod adjacency;
+mod bounds;
 mod clean;
 mod dynamics;
 mod error;

@@ -7,6 +7,7 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use crate::TriangleMesh;
 use crate::adjacency::{Spoke, spokes_of, triangles_across_edges, triangles_around_vertices};
+use crate::bounds::Bounds;
 use crate::lists::Lists;
 use crate::plate::{OnEdge, Plate, Side};
 use crate::rivals::Rivals;
@@ -44,6 +45,7 @@ pub struct Surface {
     /// Area of the triangles up to and with each one, m².
     cumulative_area: Vec<f64>,
     centroids: ImmutableKdTree<f64, 3>,
+    bounds: Bounds,
 }
 
 /// The point of one triangle closest to a query.
@@ -86,6 +88,9 @@ impl Surface {
         let centroids: Vec<[f64; 3]> = (triangles.iter())
             .map(|triangle| triangle.centroid().coords.into())
             .collect();
+        let corners: Vec<_> = (0..mesh.triangles.len())
+            .map(|at| mesh.corners(at))
+            .collect();
         let rivals = Rivals::new(mesh, &triangles, &around);
         let plate = |(index, triangle)| Plate::new(triangle, rivals.steepest(index));
         Some(Self {
@@ -95,6 +100,7 @@ impl Surface {
             triangles,
             cumulative_area,
             centroids: ImmutableKdTree::new_from_slice(&centroids).ok()?,
+            bounds: Bounds::new(&corners),
         })
     }
 
@@ -259,6 +265,26 @@ impl Surface {
         self.land(query, nearest.item)
     }
 
+    /// The closest point of the whole surface to `query`, given one that [`Surface::land`] has found: a walk does not see
+    /// a place far away that is closer. Allocates nothing.
+    pub fn audit(&self, query: &Vector3<f32>, found: Landing) -> Landing {
+        let at = Point3::from(query.cast());
+        let mut closest = None;
+        let mut squared = f64::from(found.distance).powi(2);
+        self.bounds.visit(query, squared as f32, |triangle| {
+            let nearest = self.nearest_on(&at, triangle);
+            if nearest.squared < squared {
+                squared = nearest.squared;
+                closest = Some(SurfacePoint {
+                    point: nearest.point,
+                    triangle,
+                });
+            }
+            squared as f32
+        });
+        closest.map_or(found, |closest| self.landing(query, closest))
+    }
+
     fn landing(&self, query: &Vector3<f32>, found: SurfacePoint) -> Landing {
         Landing {
             point: found.point.coords.cast(),
@@ -311,10 +337,7 @@ impl Surface {
         let below = triangle.normal.dot(&(query - current.point)) < 0.0;
         let depths = triangle.depths(&current.point);
         let rivals = (self.rivals).of(current.triangle, below, depths, current.squared);
-        let in_reach = rivals.iter().copied().filter(|&rival| {
-            self.triangles[rival as usize].height(query).powi(2) < current.squared
-        });
-        self.nearest_among(query, current.squared, in_reach)
+        self.nearest_among(query, current.squared, rivals.iter().copied())
     }
 
     /// The closest of some triangles, if it is closer than a squared distance.
@@ -328,6 +351,10 @@ impl Surface {
         let mut best = None;
         let mut least = squared * (1.0 - 1e-12) - 1e-24;
         for triangle in triangles.into_iter().filter(|&triangle| triangle != NONE) {
+            // No point of it is closer than its plane.
+            if self.triangles[triangle as usize].height(query).powi(2) >= least {
+                continue;
+            }
             let nearest = self.nearest_on(query, triangle);
             if nearest.squared < least {
                 least = nearest.squared;
@@ -534,6 +561,31 @@ mod tests {
             let most = if dent == 0.0 { 0 } else { 20 };
             assert!(others <= most, "{others}");
         }
+    }
+
+    /// A walk does not get from one ball to the other.
+    #[test]
+    fn an_audit_finds_the_closest_point_wherever_the_walk_ended() {
+        let (mut balls, other) = (ball(0.03), ball(0.0));
+        let count = balls.vertices.len() as u32;
+        let aside = Vector3::new(0.25, 0.0, 0.0);
+        (balls.vertices).extend(other.vertices.iter().map(|vertex| vertex + aside));
+        let moved = (other.triangles.iter()).map(|at| at.map(|vertex| vertex + count));
+        balls.triangles.extend(moved);
+        let surface = Surface::new(&balls).unwrap();
+        let mut better = 0;
+        for index in 0..2000 {
+            let query = Point3::from(uniform(index).map(|u| (u - 0.5) * 0.5)) + aside * 0.5;
+            let start = surface.sample(uniform(index + 7)).triangle;
+            let single = query.coords.cast();
+            let walked = surface.land(&single, start);
+            let found = surface.audit(&single, walked);
+            let exact = brute_force(&surface, &query);
+            assert!((f64::from(found.distance) - exact).abs() < 1e-7, "{query}");
+            assert!(((found.point - single).norm() - found.distance).abs() < 1e-7);
+            better += u32::from(found.distance < walked.distance - 1e-3);
+        }
+        assert!(better > 300, "{better}");
     }
 
     #[test]

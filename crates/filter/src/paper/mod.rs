@@ -8,6 +8,7 @@ mod motion;
 mod offspring;
 mod parameters;
 mod schedule;
+mod stage;
 mod weights;
 mod window;
 
@@ -28,25 +29,9 @@ pub use motion::MotionModel;
 use offspring::{Generation, Nursery};
 pub use parameters::PaperParameters;
 use schedule::Level;
+pub use stage::Stage;
 use weights::{BlockWeights, Weights};
 use window::Window;
-
-/// A part of the step, for benchmarks.
-#[derive(Clone, Copy, Debug)]
-pub enum Stage {
-    /// Random numbers for all particles.
-    Draws,
-    /// Predicted against measured torques of all particles.
-    Likelihood,
-    /// Both with the projections, as they are done in the step: in one pass.
-    PropagateAndReweight,
-    /// Common scale of all weights.
-    Normalise,
-    /// A new generation.
-    Resample,
-    /// Modes of the cloud.
-    Modes,
-}
 
 /// The paper's particle filter. The state x = {n, p, F, K} of the particles is kept link by link.
 pub(crate) struct PaperFilter {
@@ -83,6 +68,12 @@ impl PaperFilter {
             window: Window::new(robot),
             processor: Arch::new(),
         }
+    }
+
+    /// Makes steps by the instructions of this kind of processor.
+    #[cfg(test)]
+    pub(crate) fn run_on(&mut self, processor: Arch) {
+        self.processor = processor;
     }
 
     /// Forgets the last contact.
@@ -167,39 +158,6 @@ impl PaperFilter {
         (self.generation).fill(&self.cloud, &mut self.offspring, counts, &nursery);
         std::mem::swap(&mut self.cloud, &mut self.offspring);
         self.weights.equal();
-    }
-
-    /// Runs one stage by itself.
-    pub(crate) fn run_stage(&mut self, stage: Stage, step: &Step) {
-        let level = Level::at(&self.parameters, self.travelled);
-        match stage {
-            Stage::Draws => {
-                let mut draws = Draws::default();
-                for index in 0..self.cloud.blocks.len() {
-                    let purpose = Purpose::Propagate;
-                    let mut random = stream(self.seed, step.number, index, purpose);
-                    draws.draw(&level, &mut random);
-                    std::hint::black_box(&draws);
-                }
-            }
-            Stage::Likelihood => {
-                let Scratch { places, errors, .. } = &mut Scratch::default();
-                for (index, block) in self.cloud.blocks.iter().enumerate() {
-                    for run in Cloud::runs(&self.cloud.starts, index) {
-                        let likelihood = &self.likelihoods[run.link];
-                        likelihood.squared_errors(block, run.range, places, errors);
-                    }
-                    std::hint::black_box(&errors);
-                }
-            }
-            Stage::PropagateAndReweight => self.propagate_and_reweight(step, &level),
-            Stage::Normalise => self.weights.normalise(&mut self.cloud),
-            Stage::Resample => {
-                let fresh = self.parameters.fresh_share * self.count as f64;
-                self.renew(step, fresh.round() as usize);
-            }
-            Stage::Modes => {}
-        }
     }
 
     /// The particles, with their weights.

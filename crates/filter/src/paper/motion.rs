@@ -24,7 +24,7 @@ pub enum MotionModel {
     World,
 }
 
-/// One particle in so many is projected anew each step, in turn: a walk from the last triangle does not see a place far
+/// One particle in so many is projected on the whole surface each step, in turn: a walk from the last triangle does not see a place far
 /// away that is closer.
 const AUDIT: usize = 256;
 /// Forces (N) and stiffnesses (N/m) stay below this, whatever the noise.
@@ -128,16 +128,12 @@ impl LinkMotion {
         point + (self.turn * point + self.shift)
     }
 
-    /// Where a ball about `centre` touches: walks from the last triangle, and for some particles searches anew.
+    /// Where a ball about `centre` touches: walks from the last triangle; for some particles that is audited.
     #[inline(always)]
     fn touch(&self, surface: &Surface, centre: &Vector3<f32>, triangle: u32, at: usize) -> Landing {
         let walked = surface.land(centre, triangle);
-        if at % AUDIT != self.audited {
-            return walked;
-        }
-        let searched = surface.land_anew(centre);
-        match searched.distance < walked.distance {
-            true => searched,
+        match at % AUDIT == self.audited {
+            true => surface.audit(centre, walked),
             false => walked,
         }
     }

@@ -93,10 +93,8 @@ impl Generation {
         self.before_block.push(sum);
         let blocks = parents.len().div_ceil(BLOCK);
         for (index, block) in parents.blocks[..blocks].iter().enumerate() {
-            let end = (parents.len() - index * BLOCK).min(BLOCK);
-            for at in 0..end {
-                sum += weight(block, at);
-            }
+            let held = (parents.len() - index * BLOCK).min(BLOCK);
+            sum += sum_of(&block.weight[..held]) * block.scale;
             self.before_block.push(sum);
         }
         self.children.clear();
@@ -187,6 +185,19 @@ impl Parent {
             self.cumulative += weight(&parents.blocks[block], at);
         }
     }
+}
+
+/// In several parts, so that they can be added side by side.
+fn sum_of(weights: &[f32]) -> f64 {
+    let (lanes, rest) = weights.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for lane in lanes {
+        for (sum, &weight) in sums.iter_mut().zip(lane) {
+            *sum += f64::from(weight);
+        }
+    }
+    let rest = rest.iter().map(|&weight| f64::from(weight));
+    sums.into_iter().chain(rest).sum()
 }
 
 fn weight(block: &Block, at: usize) -> f64 {
