@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Counts the instructions of the filter's steps (valgrind's callgrind; one thread, fixed seeds) and compares them with
 # tests/instructions.txt: instructions do not depend on the machine's mood. Fails when a step needs over 5 % more.
-# `tests/instructions.sh --renew` stores what is counted now. Needs valgrind.
+# `tests/instructions.sh --renew` stores what is counted now. Needs valgrind, and a processor with AVX2: without it a step
+# takes more.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

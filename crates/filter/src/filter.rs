@@ -433,6 +433,7 @@ mod tests {
                 Estimator::Paper(paper) => paper.run_on(processor),
                 Estimator::Palpate { .. } => unreachable!(),
             }
+            filter.modes.run_on(processor);
             let mut intake = Intake::new(robot.dof());
             for sample in &samples {
                 filter.update(intake.admit(sample).unwrap());

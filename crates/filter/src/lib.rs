@@ -3,6 +3,7 @@
 mod cloud;
 mod detection;
 mod detector;
+mod eight;
 mod estimate;
 mod filter;
 mod intake;

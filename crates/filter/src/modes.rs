@@ -4,10 +4,12 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use palpate_model::{Kinematics, Robot};
+use pulp::{Arch, Simd, WithSimd};
 use wide::f32x8;
 
 use crate::Mode;
-use crate::cloud::{BLOCK, Block, Cloud, Column};
+use crate::cloud::{BLOCK, Block, Cloud};
+use crate::eight::Eight;
 use crate::skin::Skin;
 
 /// Edge of the cells that the weight is gathered in, m.
@@ -28,6 +30,7 @@ pub(crate) struct ModeFinder {
     grids: Vec<Option<Grid>>,
     /// What the modes found so far hold, in their order.
     balls: Vec<Ball>,
+    processor: Arch,
 }
 
 /// The particles of one link around a centre, but those that an earlier ball holds.
@@ -54,11 +57,35 @@ impl ModeFinder {
         Self {
             grids: robot.links.iter().enumerate().map(grid).collect(),
             balls: Vec::with_capacity(MOST),
+            processor: Arch::new(),
         }
+    }
+
+    /// Searches by the instructions of this kind of processor.
+    #[cfg(test)]
+    pub(crate) fn run_on(&mut self, processor: Arch) {
+        self.processor = processor;
     }
 
     /// Replaces `modes` by those of `cloud`, the heaviest first.
     pub(crate) fn find(
+        &mut self,
+        cloud: &Cloud,
+        skin: &Skin,
+        kinematics: &Kinematics,
+        modes: &mut Vec<Mode>,
+    ) {
+        self.processor.dispatch(Search {
+            finder: self,
+            cloud,
+            skin,
+            kinematics,
+            modes,
+        });
+    }
+
+    #[inline(always)]
+    fn search(
         &mut self,
         cloud: &Cloud,
         skin: &Skin,
@@ -90,15 +117,16 @@ impl ModeFinder {
         modes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     }
 
+    #[inline(always)]
     fn gather(&mut self, cloud: &Cloud) {
         let stride = stride(cloud);
         for (link, grid) in self.grids.iter_mut().enumerate() {
             let Some(grid) = grid else { continue };
             grid.clear();
             for (block, range) in cloud.of_link(link) {
-                for (group, mask) in eights(range).step_by(stride) {
-                    let weight = mask & (eight(&block.weight, group) * block.scale as f32);
-                    grid.add(place(block, group), weight.to_array());
+                for group in groups(&range).step_by(stride) {
+                    let weights = weights(block, group, &range) * block.scale as f32;
+                    grid.add(place(block, group), weights);
                 }
             }
         }
@@ -113,12 +141,13 @@ impl ModeFinder {
     }
 
     /// Two steps of mean shift (Comaniciu and Meer 2002) with a flat kernel.
+    #[inline(always)]
     fn climb(&self, cloud: &Cloud, link: usize, start: Point3<f64>) -> Ball {
         let centre = start.coords.cast().into();
         let mut ball = Ball { link, centre };
-        let summands = |_: &Block, _: usize, weight: f32x8, offset: [f32x8; 3]| {
-            let [x, y, z] = offset.map(|part| part * weight);
-            [weight, x, y, z]
+        let summands = |_: &Block, _: usize, weight: Eight, offset: [Eight; 3]| {
+            let [x, y, z] = offset;
+            [weight, x * weight, y * weight, z * weight]
         };
         for _ in 0..2 {
             let mut sums = [0.0; 4];
@@ -134,15 +163,13 @@ impl ModeFinder {
     }
 
     /// Sums up what `ball` holds.
+    #[inline(always)]
     fn sums(&self, cloud: &Cloud, ball: &Ball) -> Sums {
         let mut sums = Sums([0.0; 15]);
-        let summands = |block: &Block, group: usize, weight: f32x8, offset: [f32x8; 3]| {
+        let summands = |block: &Block, group: usize, weight: Eight, offset: [Eight; 3]| {
             let [x, y, z] = offset;
-            let [wx, wy, wz] = offset.map(|part| part * weight);
-            let normal = block
-                .normal
-                .each_ref()
-                .map(|part| eight(part, group) * weight);
+            let [wx, wy, wz] = [x * weight, y * weight, z * weight];
+            let [nx, ny, nz] = &block.normal;
             [
                 weight,
                 wx,
@@ -154,11 +181,11 @@ impl ModeFinder {
                 wy * y,
                 wy * z,
                 wz * z,
-                normal[0],
-                normal[1],
-                normal[2],
-                eight(&block.force, group) * weight,
-                eight(&block.stiffness, group) * weight,
+                Eight::of(nx, group) * weight,
+                Eight::of(ny, group) * weight,
+                Eight::of(nz, group) * weight,
+                Eight::of(&block.force, group) * weight,
+                Eight::of(&block.stiffness, group) * weight,
             ]
         };
         self.visit(cloud, ball, summands, 1, &mut sums.0);
@@ -167,67 +194,85 @@ impl ModeFinder {
 
     /// Adds up, over all that `ball` holds, what `summands` tells of eight particles: from block, group, weights and
     /// offsets from the centre, m; every `stride` groups. Single precision within a block, double between them.
+    #[inline(always)]
     fn visit<const N: usize>(
         &self,
         cloud: &Cloud,
         ball: &Ball,
-        summands: impl Fn(&Block, usize, f32x8, [f32x8; 3]) -> [f32x8; N],
+        summands: impl Fn(&Block, usize, Eight, [Eight; 3]) -> [Eight; N],
         stride: usize,
         sums: &mut [f64; N],
     ) {
         for (block, range) in cloud.of_link(ball.link) {
-            let mut of_block = [f32x8::ZERO; N];
-            for (group, mask) in eights(range).step_by(stride) {
+            let mut of_block = [Eight::ZERO; N];
+            for group in groups(&range).step_by(stride) {
                 let place = place(block, group);
-                let held = self.held(ball, &place, mask);
-                if !held.any() {
+                let held = self.held(ball, &place, weights(block, group, &range));
+                if held.is_zero() {
                     continue;
                 }
-                let weight = held & eight(&block.weight, group);
-                let offset = ball.offset(&place);
-                for (sum, summand) in
-                    (of_block.iter_mut()).zip(summands(block, group, weight, offset))
-                {
+                let summands = summands(block, group, held, ball.offset(&place));
+                for (sum, summand) in of_block.iter_mut().zip(summands) {
                     *sum += summand;
                 }
             }
             for (sum, of_block) in sums.iter_mut().zip(of_block) {
-                let of_block: f64 = of_block.to_array().into_iter().map(f64::from).sum();
+                let of_block: f64 = of_block.0.into_iter().map(f64::from).sum();
                 *sum += of_block * block.scale;
             }
         }
     }
 
-    /// Which of some particles of the ball's link it holds, as a mask.
-    #[inline]
-    fn held(&self, ball: &Ball, place: &[f32x8; 3], mask: f32x8) -> f32x8 {
-        let mut held = mask & ball.reaches(place);
-        if held.any() {
-            let earlier = self.balls.iter();
-            for earlier in earlier.filter(|earlier| earlier.link == ball.link) {
-                held &= !earlier.reaches(place);
-            }
+    /// The weights of those of eight particles of the ball's link that it holds, else zeros.
+    #[inline(always)]
+    fn held(&self, ball: &Ball, place: &[Eight; 3], weights: Eight) -> Eight {
+        let within = |squared: f32| squared < REACH * REACH;
+        let mut held = weights.only(ball.squared(place), within);
+        if held.is_zero() {
+            return held;
+        }
+        let earlier = self.balls.iter();
+        for earlier in earlier.filter(|earlier| earlier.link == ball.link) {
+            held = held.only(earlier.squared(place), |squared| !within(squared));
         }
         held
     }
 
     /// Takes the weight that `ball` holds out of the search.
+    #[inline(always)]
     fn take_out(&mut self, cloud: &Cloud, ball: &Ball) {
         let Some(mut grid) = self.grids[ball.link].take() else {
             return;
         };
         let stride = stride(cloud);
         for (block, range) in cloud.of_link(ball.link) {
-            for (group, mask) in eights(range).step_by(stride) {
+            for group in groups(&range).step_by(stride) {
                 let place = place(block, group);
-                let held = self.held(ball, &place, mask);
-                if held.any() {
-                    let weight = held & (eight(&block.weight, group) * -block.scale as f32);
-                    grid.add(place, weight.to_array());
+                let held = self.held(ball, &place, weights(block, group, &range));
+                if !held.is_zero() {
+                    grid.add(place, held * (-block.scale as f32));
                 }
             }
         }
         self.grids[ball.link] = Some(grid);
+    }
+}
+
+/// A search, compiled for each kind of processor that it may run on.
+struct Search<'a> {
+    finder: &'a mut ModeFinder,
+    cloud: &'a Cloud,
+    skin: &'a Skin,
+    kinematics: &'a Kinematics,
+    modes: &'a mut Vec<Mode>,
+}
+
+impl WithSimd for Search<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        (self.finder).search(self.cloud, self.skin, self.kinematics, self.modes);
     }
 }
 
@@ -236,38 +281,53 @@ fn stride(cloud: &Cloud) -> usize {
     (cloud.len() / GATHERED).clamp(1, BLOCK / 8)
 }
 
-/// Eight numbers of a column side by side.
-#[inline]
-fn eight(column: &Column, group: usize) -> f32x8 {
-    f32x8::new(column.as_chunks().0[group])
+#[inline(always)]
+fn place(block: &Block, group: usize) -> [Eight; 3] {
+    let [x, y, z] = &block.point;
+    [
+        Eight::of(x, group),
+        Eight::of(y, group),
+        Eight::of(z, group),
+    ]
 }
 
-#[inline]
-fn place(block: &Block, group: usize) -> [f32x8; 3] {
-    block.point.each_ref().map(|column| eight(column, group))
+/// The groups of eight that hold a range.
+#[inline(always)]
+fn groups(range: &Range<usize>) -> Range<usize> {
+    range.start / 8..range.end.div_ceil(8)
 }
 
-/// The groups of eight that hold a range, each with a mask of those in the range.
-fn eights(range: Range<usize>) -> impl Iterator<Item = (usize, f32x8)> {
-    let [start, end] = [range.start, range.end].map(|index| f32x8::splat(index as f32));
-    (range.start / 8..range.end.div_ceil(8)).map(move |group| {
-        let first = group as f32 * 8.0;
-        let index = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]) + first;
-        (group, index.simd_ge(start) & index.simd_lt(end))
-    })
+/// The weights of those of a group that are in a range, else zeros.
+#[inline(always)]
+fn weights(block: &Block, group: usize, range: &Range<usize>) -> Eight {
+    let (weights, first) = (Eight::of(&block.weight, group), group * 8);
+    if range.start <= first && first + 8 <= range.end {
+        return weights;
+    }
+    let mut within = Eight::ZERO;
+    for at in 0..8 {
+        if range.contains(&(first + at)) {
+            within.0[at] = weights.0[at];
+        }
+    }
+    within
 }
 
 impl Ball {
-    #[inline]
-    fn offset(&self, place: &[f32x8; 3]) -> [f32x8; 3] {
-        std::array::from_fn(|axis| place[axis] - self.centre[axis])
+    #[inline(always)]
+    fn offset(&self, place: &[Eight; 3]) -> [Eight; 3] {
+        let [x, y, z] = self.centre;
+        [place[0] - x, place[1] - y, place[2] - z]
     }
 
-    /// Which of eight places are within reach, as a mask.
-    #[inline]
-    fn reaches(&self, place: &[f32x8; 3]) -> f32x8 {
+    /// Squared distances of eight places, m².
+    #[inline(always)]
+    fn squared(&self, place: &[Eight; 3]) -> Eight {
         let [x, y, z] = self.offset(place);
-        (x * x + y * y + z * z).simd_lt(f32x8::splat(REACH * REACH))
+        let mut squared = x * x;
+        squared += y * y;
+        squared += z * z;
+        squared
     }
 }
 
@@ -354,7 +414,8 @@ impl Grid {
 
     /// The cells of eight places.
     #[inline]
-    fn cells(&self, place: [f32x8; 3]) -> [i32; 8] {
+    fn cells(&self, place: [Eight; 3]) -> [i32; 8] {
+        let place = place.map(|axis| f32x8::new(axis.0));
         let [x, y, z]: [f32x8; 3] = std::array::from_fn(|axis| {
             let along = (place[axis] - self.corner[axis] as f32) * (1.0 / CELL as f32);
             let most = f32x8::splat((self.shape[axis] - 2) as f32);
@@ -365,8 +426,8 @@ impl Grid {
     }
 
     #[inline]
-    fn add(&mut self, place: [f32x8; 3], weights: [f32; 8]) {
-        for (cell, weight) in self.cells(place).into_iter().zip(weights) {
+    fn add(&mut self, place: [Eight; 3], weights: Eight) {
+        for (cell, weight) in self.cells(place).into_iter().zip(weights.0) {
             let (cell, weight) = (cell as usize, f64::from(weight));
             if self.weight[cell] == 0.0 && weight > 0.0 {
                 self.occupied.push(cell);
