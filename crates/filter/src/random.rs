@@ -53,9 +53,9 @@ impl Bundle {
     pub(crate) fn fill<const N: usize>(&mut self, column: &mut [u32; N]) {
         let [s0, s1, s2, s3] = &mut self.0;
         for bits in column.as_chunks_mut::<LANES>().0 {
-            for lane in 0..LANES {
+            for (lane, bits) in bits.iter_mut().enumerate() {
                 let sum = s0[lane].wrapping_add(s3[lane]);
-                bits[lane] = sum.rotate_left(7).wrapping_add(s0[lane]);
+                *bits = sum.rotate_left(7).wrapping_add(s0[lane]);
                 let shifted = s1[lane] << 9;
                 s2[lane] ^= s0[lane];
                 s3[lane] ^= s1[lane];

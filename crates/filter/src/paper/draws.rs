@@ -76,8 +76,10 @@ fn draw_normals(
 ) {
     random.fill(&mut bits[0]);
     random.fill(&mut bits[1]);
-    for at in 0..BLOCK {
-        (first[at], second[at]) = normals(bits[0][at], bits[1][at]);
+    let [lengths, angles] = bits;
+    let columns = first.iter_mut().zip(second);
+    for ((first, second), (&length, &angle)) in columns.zip(lengths.iter().zip(&*angles)) {
+        (*first, *second) = normals(length, angle);
     }
 }
 
