@@ -25,6 +25,8 @@ pub(super) enum Phase {
     Scan(usize),
     /// Climb as bars from the best balls, so many rounds.
     Bars(usize),
+    /// Climb as drifting obstacles from the best that rest, so many rounds.
+    Drifts(usize),
     /// See what systematic errors would do to each peak.
     Sight,
     /// Move each particle, so many rounds.

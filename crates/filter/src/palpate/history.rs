@@ -101,6 +101,7 @@ impl History<'_> {
         let core = Core {
             centre: place.point + normal.into_inner() * radius,
             axis: turn.map(|turn| tangential(&side, &normal, turn)),
+            drift: None,
         };
         let root_from_link = self.newest_link_from_root(link as u16).inverse();
         Obstacle {
@@ -111,7 +112,7 @@ impl History<'_> {
         }
     }
 
-    /// Another obstacle about where this one touches: somewhat beside it, of any kind and radius.
+    /// Another obstacle about where this one touches, that moves as it does: somewhat beside it, of any kind and radius.
     pub(super) fn elsewhere(&self, obstacle: &Obstacle, random: &mut impl Rng) -> Obstacle {
         let touch = self.newest_touch(obstacle);
         let link = obstacle.link as usize;
@@ -133,11 +134,13 @@ impl History<'_> {
         };
         let turn = std::f64::consts::PI * random.random::<f64>();
         self.obstacle_at(&place, radius, random.random::<bool>().then_some(turn))
+            .drifting(obstacle.core.drift)
     }
 
-    /// The same contact with the same radius, but as a ball, or as a bar at an angle `turn` about the normal.
+    /// The same contact with the same radius and motion, but as a ball, or as a bar at an angle `turn` about the normal.
     pub(super) fn reshaped(&self, obstacle: &Obstacle, turn: Option<f64>) -> Obstacle {
         let touch = self.newest_touch(obstacle);
         self.obstacle_at(&Place::of(obstacle, &touch), touch.distance, turn)
+            .drifting(obstacle.core.drift)
     }
 }

@@ -13,6 +13,8 @@ const LENGTHS_SECS: [f64; 5] = [0.01, 0.02, 0.03, 0.05, 0.1];
 pub(super) struct Keyframe {
     /// Number of samples.
     pub(super) samples: f64,
+    /// Mean time since the contact began, s.
+    pub(super) secs: f64,
     /// Time between first and last sample, with one sample's length, s.
     pub(super) length_secs: f64,
     /// Mean joint positions, rad.
@@ -50,6 +52,7 @@ impl Keyframe {
 
     fn absorb(&mut self, other: &Keyframe) {
         let share = other.samples / (self.samples + other.samples);
+        self.secs += share * (other.secs - self.secs);
         let blend = |mine: &mut [f64], others: &[f64]| {
             for (mine, other) in mine.iter_mut().zip(others) {
                 *mine += share * (other - *mine);
@@ -67,6 +70,8 @@ impl Keyframe {
 #[derive(Clone, Debug, Default)]
 struct Filling {
     samples: f64,
+    /// Sum of the samples' times since the contact began, s.
+    secs: f64,
     first_ns: i64,
     last_ns: Option<i64>,
     first_position: Vec<f64>,
@@ -81,6 +86,9 @@ pub(super) struct Memory {
     filling: Filling,
     kinematics: Kinematics,
     committed: usize,
+    /// When the contact began, and the time since then at the last sample, s.
+    begin_ns: i64,
+    now_secs: f64,
     /// Typical time between samples, s.
     period_secs: f64,
 }
@@ -92,6 +100,8 @@ impl Memory {
             filling: Filling::default(),
             kinematics: Kinematics::new(robot),
             committed: 0,
+            begin_ns: 0,
+            now_secs: 0.0,
             period_secs: 0.01,
         }
     }
@@ -107,6 +117,10 @@ impl Memory {
     /// Takes a sample in.
     pub(super) fn push(&mut self, stamp_ns: i64, position: &[f64], torque: &[f64]) {
         let filling = &mut self.filling;
+        if filling.last_ns.is_none() {
+            self.begin_ns = stamp_ns;
+        }
+        self.now_secs = stamp_ns.saturating_sub(self.begin_ns) as f64 * 1e-9;
         if let Some(last_ns) = filling.last_ns {
             let period = stamp_ns.saturating_sub(last_ns) as f64 * 1e-9;
             // A gap is not the rate.
@@ -119,10 +133,12 @@ impl Memory {
                 filling.last_position.extend(position);
             }
             filling.first_position.clone_from(&filling.last_position);
+            filling.secs = 0.0;
             refill(&mut filling.position, position.len());
             refill(&mut filling.torque, torque.len());
         }
         filling.samples += 1.0;
+        filling.secs += self.now_secs;
         filling.last_ns = Some(stamp_ns);
         filling.last_position.copy_from_slice(position);
         add(&mut filling.position, position);
@@ -138,6 +154,16 @@ impl Memory {
     /// Typical time between samples, s.
     pub(super) fn period_secs(&self) -> f64 {
         self.period_secs
+    }
+
+    /// Time of the newest keyframe since the contact began, s; 0 without one.
+    pub(super) fn newest_secs(&self) -> f64 {
+        self.keyframes.last().map_or(0.0, |newest| newest.secs)
+    }
+
+    /// Time of the last sample since the newest keyframe, s.
+    pub(super) fn since_newest_secs(&self) -> f64 {
+        self.now_secs - self.newest_secs()
     }
 
     /// Forgets all but the last keyframes.
@@ -161,6 +187,7 @@ impl Memory {
             .collect();
         let mut keyframe = Keyframe {
             samples: filling.samples,
+            secs: filling.secs / filling.samples,
             length_secs: filling.samples * self.period_secs,
             position: mean(&filling.position),
             velocity,

@@ -1,6 +1,6 @@
 //! The estimator of this project: the paper's curvature model with memory.
 //!
-//! A particle is an obstacle that rests in the world ([`obstacle`]); its weight is the evidence of the contact's whole
+//! A particle is an obstacle that rests in the world or drifts ([`obstacle`]); its weight is the evidence of the contact's whole
 //! history ([`memory`], [`evidence`]), with force, stiffness, friction and bias solved and the noise learned
 //! ([`noise`]). Peaks of the evidence are found by asking every triangle ([`scan`]) and climbing ([`search`]); Markov
 //! chain moves ([`moves`]) carry the particles between and around them, so that a wrong mode is left again. The work
@@ -119,12 +119,23 @@ impl PalpateFilter {
         self.noise.learn(step.torque);
         self.memory.push(stamp_ns, step.position, step.torque);
         if self.agenda.phase == Phase::Idle && self.memory.is_complete() {
+            let past_secs = self.memory.newest_secs();
             self.memory.commit(step.robot);
+            self.drift_on(self.memory.newest_secs() - past_secs);
             self.take_in_keyframe(step);
         }
         self.agenda.pay(self.memory.period_secs());
         while self.agenda.goes_on() {
             self.work(step);
+        }
+    }
+
+    /// Carries what drifts on to the newest keyframe.
+    fn drift_on(&mut self, secs: f64) {
+        let particles = self.particles.iter_mut().map(|one| &mut one.obstacle);
+        let peaks = self.peaks.iter_mut().map(|peak| &mut peak.obstacle);
+        for obstacle in particles.chain(peaks) {
+            obstacle.core = obstacle.core.after(secs);
         }
     }
 
@@ -198,6 +209,7 @@ impl PalpateFilter {
             self.particles.iter().map(|particle| particle.log_weight),
             &mut self.weights,
         );
+        let since_secs = self.memory.since_newest_secs();
         cloud.extend(
             self.particles
                 .iter()
@@ -205,7 +217,11 @@ impl PalpateFilter {
                 .map(|(particle, &weight)| {
                     let link = particle.obstacle.link as usize;
                     let link_from_root = step.now.root_from_link(link).inverse();
-                    let touch = particle.obstacle.touch(step.skin, &link_from_root);
+                    let obstacle = Obstacle {
+                        core: particle.obstacle.core.after(since_secs),
+                        ..particle.obstacle
+                    };
+                    let touch = obstacle.touch(step.skin, &link_from_root);
                     Particle {
                         link,
                         point_in_link: touch.point,

@@ -31,7 +31,7 @@ pub(super) struct Proposals<'a> {
 
 impl<'a> Proposals<'a> {
     pub(super) fn new(history: History<'a>, others: &'a [Hypothesis], peaks: &'a [Peak]) -> Self {
-        let mut akin = vec![Vec::new(); 2 * Likeness::ALL.len() * history.robot.links.len()];
+        let mut akin = vec![Vec::new(); 4 * Likeness::ALL.len() * history.robot.links.len()];
         for (index, other) in others.iter().enumerate() {
             akin[kind(&other.obstacle)].push(index as u32);
         }
@@ -180,8 +180,17 @@ impl<'a> Proposals<'a> {
                     own.into_inner() + (one.into_inner() - other.into_inner() * sign) * gamma;
                 Unit::new_normalize(turned)
             });
+        let drift = core
+            .drift
+            .zip(one.drift)
+            .zip(other.drift)
+            .map(|((own, one), other)| own + (one - other) * gamma);
         let obstacle = Obstacle {
-            core: Core { centre, axis },
+            core: Core {
+                centre,
+                axis,
+                drift,
+            },
             ..particle.obstacle
         };
         self.decide(particle, obstacle, 0.0, random);
@@ -238,7 +247,11 @@ impl<'a> Proposals<'a> {
         let turn = random.sample::<f64, _>(StandardNormal) * size * 20.0;
         let axis = core.axis.map(|axis| tangential(&axis, &normal, turn));
         let obstacle = Obstacle {
-            core: Core { centre, axis },
+            core: Core {
+                centre,
+                axis,
+                ..core
+            },
             ..particle.obstacle
         };
         self.decide(particle, obstacle, 0.0, random);
@@ -247,7 +260,9 @@ impl<'a> Proposals<'a> {
 
 fn kind(obstacle: &Obstacle) -> usize {
     let is_bar = usize::from(obstacle.core.axis.is_some());
-    (obstacle.link as usize * Likeness::ALL.len() + obstacle.likeness as usize) * 2 + is_bar
+    let drifts = usize::from(obstacle.core.drift.is_some());
+    let likeness = obstacle.link as usize * Likeness::ALL.len() + obstacle.likeness as usize;
+    likeness * 4 + 2 * is_bar + drifts
 }
 
 fn gauss(random: &mut impl Rng) -> Vector3<f64> {

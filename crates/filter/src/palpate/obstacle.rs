@@ -1,4 +1,5 @@
-//! A hypothesis about the obstacle: locally a ball or a bar that rests in the world, pressed against one link.
+//! A hypothesis about the obstacle: locally a ball or a bar that rests in the world or drifts through it, pressed
+//! against one link.
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use palpate_model::{Robot, SmoothBody, Surface};
@@ -19,6 +20,9 @@ const BAR_HALF_LENGTH: f64 = 0.3;
 const BAR_TOLERANCE: f64 = 1e-5;
 /// Typical radius of a link, m.
 pub(super) const LINK_RADIUS: f64 = 0.07;
+/// Share of obstacles that drift, and the standard deviation of each component of their velocity, m/s.
+const DRIFTING: f64 = 0.1;
+pub(super) const DRIFT_STD: f64 = 5e-3;
 /// Smallest and largest radius of an obstacle's curvature, m.
 pub(super) const RADIUS_RANGE: [f64; 2] = [1e-3, 1.0];
 
@@ -30,6 +34,8 @@ pub(super) struct Core {
     pub(super) centre: Point3<f64>,
     /// Direction of a bar; none for a ball.
     pub(super) axis: Option<Unit<Vector3<f64>>>,
+    /// Velocity of what drifts, m/s; none for what rests.
+    pub(super) drift: Option<Vector3<f64>>,
 }
 
 impl Core {
@@ -38,7 +44,20 @@ impl Core {
         Self {
             centre: a_from_b * self.centre,
             axis: self.axis.map(|axis| a_from_b.rotation * axis),
+            drift: self.drift.map(|drift| a_from_b.rotation * drift),
         }
+    }
+
+    /// Where it is so much later, s.
+    pub(super) fn after(&self, secs: f64) -> Self {
+        Self {
+            centre: self.centre + self.velocity() * secs,
+            ..*self
+        }
+    }
+
+    fn velocity(&self) -> Vector3<f64> {
+        self.drift.unwrap_or_default()
     }
 }
 
@@ -50,7 +69,7 @@ pub(super) struct Obstacle {
     pub(super) likeness: Likeness,
     /// Triangle that the contact was on when last looked at: where the next projection starts.
     pub(super) triangle: u32,
-    /// The core in the root frame.
+    /// The core in the root frame, where it is at the newest keyframe.
     pub(super) core: Core,
 }
 
@@ -138,11 +157,12 @@ fn touch_ball(shape: &Shape, centre: &Point3<f64>, start: u32) -> Touch {
 }
 
 impl LinkView {
-    /// Directions of the forces on the link at a touch.
-    fn directions(&self, touch: &Touch) -> Directions {
+    /// Directions of the forces on the link at a touch with a core in the root frame.
+    fn directions(&self, touch: &Touch, core: &Core) -> Directions {
         let linear: Vector3<f64> = self.velocity.fixed_rows::<3>(0).into_owned();
         let angular: Vector3<f64> = self.velocity.fixed_rows::<3>(3).into_owned();
-        let velocity = linear + angular.cross(&touch.point.coords);
+        let of_link = linear + angular.cross(&touch.point.coords);
+        let velocity = of_link - self.link_from_root.rotation * core.velocity();
         let slip = velocity - touch.normal.into_inner() * velocity.dot(&touch.normal);
         Directions {
             push: -touch.normal.into_inner(),
@@ -152,6 +172,12 @@ impl LinkView {
 }
 
 impl Obstacle {
+    /// The same, but with this velocity in the root frame, m/s, or at rest.
+    pub(super) fn drifting(self, drift: Option<Vector3<f64>>) -> Self {
+        let core = Core { drift, ..self.core };
+        Self { core, ..self }
+    }
+
     /// The shape of the link that it touches.
     pub(super) fn shape<'a>(&self, skin: &'a Skin) -> Shape<'a> {
         let link = self.link as usize;
@@ -192,7 +218,8 @@ impl Obstacle {
             for (lever, felt) in levers.iter_mut().zip(felt) {
                 *lever = felt;
             }
-            sums.add(e, &view.directions(&touch), &levers[..path.len()]);
+            let directions = view.directions(&touch, &self.core);
+            sums.add(e, &directions, &levers[..path.len()]);
         });
         let Some(newest) = newest else {
             return Evidence::default();
@@ -217,8 +244,10 @@ impl Obstacle {
         let link = self.link as usize;
         let shape = self.shape(skin);
         let (mut start, mut along) = (self.triangle, 0.0);
+        let newest_secs = keyframes.last().map_or(0.0, |newest| newest.secs);
         for (index, keyframe) in keyframes.iter().enumerate().rev() {
-            let core = self.core.moved(&keyframe.links[link].link_from_root);
+            let core = self.core.after(keyframe.secs - newest_secs);
+            let core = core.moved(&keyframe.links[link].link_from_root);
             let touch = touch(&shape, &core, start, along);
             (start, along) = (touch.triangle, touch.along);
             visit(index, keyframe, touch);
@@ -268,7 +297,7 @@ impl Obstacle {
         let link = self.link as usize;
         let path = &history.robot.links[link].path;
         let keyframe = &history.keyframes[index];
-        let Directions { push, rub } = keyframe.links[link].directions(touch);
+        let Directions { push, rub } = keyframe.links[link].directions(touch, &self.core);
         let unit = push + rub * evidence.friction + evidence.tilt;
         let slack = (self.likeness.slack() * force).powi(2);
         for (lever, &joint) in
@@ -316,6 +345,20 @@ impl Obstacle {
         let normalisation = 2.0 * area * (RADIUS_RANGE[1] / RADIUS_RANGE[0]).ln();
         direction - normalisation.ln() - radius.ln() - 2.0 * (1.0 + radius / LINK_RADIUS).ln()
             + log_radius_prior(distance)
+            + self.core.log_drift_prior()
+    }
+}
+
+impl Core {
+    /// Log of the prior density of how it moves: most obstacles rest.
+    pub(super) fn log_drift_prior(&self) -> f64 {
+        match self.drift {
+            None => (1.0 - DRIFTING).ln(),
+            Some(drift) => {
+                let normalisation = 3.0 * (DRIFT_STD * std::f64::consts::TAU.sqrt()).ln();
+                DRIFTING.ln() - normalisation - 0.5 * drift.norm_squared() / (DRIFT_STD * DRIFT_STD)
+            }
+        }
     }
 }
 

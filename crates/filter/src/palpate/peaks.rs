@@ -1,20 +1,22 @@
 //! Peaks of the evidence: climbed by Newton's method, each with its Laplace approximation.
 
-use nalgebra::{Matrix3, Matrix3x2, Matrix4, Vector4};
+use nalgebra::{Matrix3, Matrix3x2, SMatrix};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-use super::chart::Chart;
+use super::chart::{COORDINATES, Chart, Coordinates};
 use super::evidence::Evidence;
 use super::history::History;
 use super::obstacle::{Core, Obstacle, Touch, log_radius_prior};
 
-/// Finite-difference steps along the chart's axes: m, m, on the logarithm of the radius, rad.
-pub(super) const STEPS: [f64; 4] = [1e-3, 1e-3, 0.1, 0.05];
-/// Precision that the chart's axes have anyhow: a decimetre, a decimetre, a factor of five, a radian.
-const PRIOR_PRECISION: [f64; 4] = [100.0, 100.0, 0.4, 1.0];
+type Square = SMatrix<f64, COORDINATES, COORDINATES>;
+
+/// Finite-difference steps along the chart's axes: m, m, on the logarithm of the radius, rad, and three times m/s.
+pub(super) const STEPS: [f64; COORDINATES] = [1e-3, 1e-3, 0.1, 0.05, 3e-4, 3e-4, 3e-4];
+/// Precision that the chart's axes have anyhow: a decimetre, a decimetre, a factor of five, a radian, decimetres a second.
+const PRIOR_PRECISION: [f64; COORDINATES] = [100.0, 100.0, 0.4, 1.0, 100.0, 100.0, 100.0];
 /// Longest Newton step along the chart's axes.
-const REACH: [f64; 4] = [0.02, 0.02, 1.0, 0.5];
+const REACH: [f64; COORDINATES] = [0.02, 0.02, 1.0, 0.5, 5e-3, 5e-3, 5e-3];
 /// A peak that moves by less than this share of a step rests.
 const AT_REST: f64 = 0.1;
 /// How much wider than Laplace's approximation the draws are, and which share of them, so that tails are reached.
@@ -31,9 +33,9 @@ pub(super) struct Peak {
     /// Whether the last step hardly moved it.
     pub(super) rests: bool,
     chart: Chart,
-    precision: Matrix4<f64>,
+    precision: Square,
     /// Lower Cholesky factor of the covariance.
-    root: Matrix4<f64>,
+    root: Square,
     /// Covariance of the contact point from systematic errors, m², in the link's frame, once it was
     /// looked at.
     pub(super) sight: Option<Matrix3<f64>>,
@@ -48,8 +50,8 @@ impl Peak {
         Self {
             chart: Chart::new(link_from_root, &obstacle.core, &touch),
             log_mass: evidence.log,
-            precision: Matrix4::identity(),
-            root: Matrix4::identity(),
+            precision: Square::identity(),
+            root: Square::identity(),
             rests: false,
             sight: None,
             obstacle,
@@ -64,23 +66,23 @@ impl Peak {
             sight: self.sight,
             ..Self::new(self.obstacle, history)
         };
-        let dimension = self.chart.dimension();
-        let value = |x: &Vector4<f64>| self.try_at(x, history).2;
-        let here = value(&Vector4::zeros());
+        let counting = self.chart.counting();
+        let value = |x: &Coordinates| self.try_at(x, history).2;
+        let here = value(&Coordinates::zeros());
         let offset = |axis: usize, sign: f64| {
-            let mut x = Vector4::zeros();
+            let mut x = Coordinates::zeros();
             x[axis] = sign * STEPS[axis];
             x
         };
-        let mut gradient = Vector4::zeros();
-        let mut hessian = Matrix4::zeros();
-        let mut ahead = [0.0; 4];
-        for i in 0..dimension {
+        let mut gradient = Coordinates::zeros();
+        let mut hessian = Square::zeros();
+        let mut ahead = [0.0; COORDINATES];
+        for (done, &i) in counting.iter().enumerate() {
             ahead[i] = value(&offset(i, 1.0));
             let behind = value(&offset(i, -1.0));
             gradient[i] = (ahead[i] - behind) / (2.0 * STEPS[i]);
             hessian[(i, i)] = (ahead[i] - 2.0 * here + behind) / (STEPS[i] * STEPS[i]);
-            for j in 0..i {
+            for &j in &counting[..done] {
                 let both = value(&(offset(i, 1.0) + offset(j, 1.0)));
                 let mixed = (both - ahead[i] - ahead[j] + here) / (STEPS[i] * STEPS[j]);
                 hessian[(i, j)] = mixed;
@@ -89,7 +91,7 @@ impl Peak {
         }
         let covariance = self.approximate(&hessian, here);
         let newton = covariance * gradient;
-        let scale = (0..4)
+        let scale = (0..COORDINATES)
             .map(|i| newton[i].abs() / REACH[i])
             .fold(1.0, f64::max);
         self.rests = self.search_along(newton / scale, here, history) < AT_REST;
@@ -97,40 +99,48 @@ impl Peak {
 
     /// Laplace's approximation from the log posterior's second derivatives. Away from a maximum the curvature may
     /// have either sign: its size still is a scale. Returns the covariance.
-    fn approximate(&mut self, hessian: &Matrix4<f64>, log_posterior: f64) -> Matrix4<f64> {
+    fn approximate(&mut self, hessian: &Square, log_posterior: f64) -> Square {
         let eigen = hessian.symmetric_eigen();
-        let lifted = Matrix4::from_diagonal(&eigen.eigenvalues.map(f64::abs));
+        let lifted = Square::from_diagonal(&eigen.eigenvalues.map(f64::abs));
         self.precision = eigen.eigenvectors * lifted * eigen.eigenvectors.transpose();
-        self.precision += Matrix4::from_diagonal(&PRIOR_PRECISION.into());
+        self.precision += Square::from_diagonal(&PRIOR_PRECISION.into());
         let covariance = self
             .precision
             .try_inverse()
-            .unwrap_or_else(Matrix4::identity);
+            .unwrap_or_else(Square::identity);
         self.root = covariance
             .cholesky()
-            .map_or_else(Matrix4::zeros, |factor| factor.l());
-        // Per dimension √2π from the Gaussian, and a bar's direction has the prior density 1/π.
-        let constant = match self.chart.dimension() {
-            4 => 0.5 * std::f64::consts::TAU.ln() - std::f64::consts::PI.ln(),
-            _ => 0.5 * PRIOR_PRECISION[3].ln(),
-        };
-        self.log_mass = log_posterior + constant - 0.5 * self.log_determinant();
+            .map_or_else(Square::zeros, |factor| factor.l());
+        self.log_mass = log_posterior + self.log_gaussian() - self.log_direction();
         covariance
     }
 
-    fn log_determinant(&self) -> f64 {
-        self.precision.determinant().max(f64::MIN_POSITIVE).ln()
+    /// Log of the volume of the peak's Gaussian over the coordinates that count: √2π for each, and the determinant.
+    fn log_gaussian(&self) -> f64 {
+        let counting = self.chart.counting();
+        let unused = (0..COORDINATES).filter(|axis| !counting.contains(axis));
+        let of_unused: f64 = unused.map(|axis| PRIOR_PRECISION[axis].ln()).sum();
+        let determinant = self.precision.determinant().max(f64::MIN_POSITIVE);
+        0.5 * (counting.len() as f64 * std::f64::consts::TAU.ln() + of_unused - determinant.ln())
+    }
+
+    /// Minus the log of the prior density of a bar's direction.
+    fn log_direction(&self) -> f64 {
+        match self.obstacle.core.axis {
+            None => 0.0,
+            Some(_) => std::f64::consts::PI.ln(),
+        }
     }
 
     /// Goes as much of `way` as improves the posterior. Tells how far it moved, in steps.
-    fn search_along(&mut self, way: Vector4<f64>, here: f64, history: &History) -> f64 {
+    fn search_along(&mut self, way: Coordinates, here: f64, history: &History) -> f64 {
         for share in [1.0, 0.4, 0.1] {
             let (obstacle, evidence, value) = self.try_at(&(way * share), history);
             if value > here {
                 self.obstacle = obstacle;
                 self.evidence = evidence;
                 self.log_mass += value - here;
-                return (0..4)
+                return (0..COORDINATES)
                     .map(|i| (way[i] * share / STEPS[i]).abs())
                     .fold(0.0, f64::max);
             }
@@ -139,7 +149,7 @@ impl Peak {
     }
 
     /// The obstacle at x in the peak's chart.
-    pub(super) fn at(&self, x: &Vector4<f64>, history: &History) -> Obstacle {
+    pub(super) fn at(&self, x: &Coordinates, history: &History) -> Obstacle {
         let shape = history.shape(&self.obstacle);
         Obstacle {
             core: self.chart.core(&shape, x),
@@ -147,9 +157,9 @@ impl Peak {
         }
     }
 
-    /// Number of coordinates that count.
-    pub(super) fn dimension(&self) -> usize {
-        self.chart.dimension()
+    /// The coordinates that count.
+    pub(super) fn counting(&self) -> &'static [usize] {
+        self.chart.counting()
     }
 
     /// The two directions along the surface, in the link's frame.
@@ -158,10 +168,11 @@ impl Peak {
     }
 
     /// Obstacle, evidence and log posterior in the chart's measure at x.
-    fn try_at(&self, x: &Vector4<f64>, history: &History) -> (Obstacle, Evidence, f64) {
+    fn try_at(&self, x: &Coordinates, history: &History) -> (Obstacle, Evidence, f64) {
         let mut obstacle = self.at(x, history);
         let evidence = history.evidence(&mut obstacle);
-        let value = evidence.log + log_radius_prior(self.chart.radius(x));
+        let log_prior = log_radius_prior(self.chart.radius(x)) + obstacle.core.log_drift_prior();
+        let value = evidence.log + log_prior;
         (obstacle, evidence, value)
     }
 
@@ -172,25 +183,25 @@ impl Peak {
         } else {
             WIDTHS[1].1
         };
-        self.displaced(&Vector4::zeros(), widen, history, random)
+        self.displaced(&Coordinates::zeros(), widen, history, random)
     }
 
     /// A core some standard deviations, in all directions of the peak's Gaussian, from the one at x.
     pub(super) fn displaced(
         &self,
-        x: &Vector4<f64>,
+        x: &Coordinates,
         deviations: f64,
         history: &History,
         random: &mut impl Rng,
     ) -> Core {
-        let gauss = Vector4::from_fn(|_, _| random.sample::<f64, _>(StandardNormal));
+        let gauss = Coordinates::from_fn(|_, _| random.sample::<f64, _>(StandardNormal));
         let shape = history.shape(&self.obstacle);
         self.chart
             .core(&shape, &(x + self.root * gauss * deviations))
     }
 
     /// Coordinates of a core in the peak's chart, with the log of the volume element.
-    pub(super) fn coordinates(&self, core: &Core) -> Option<(Vector4<f64>, f64)> {
+    pub(super) fn coordinates(&self, core: &Core) -> Option<(Coordinates, f64)> {
         self.chart.coordinates(core)
     }
 
@@ -200,22 +211,18 @@ impl Peak {
             return f64::NEG_INFINITY;
         };
         let squared = x.dot(&(self.precision * x));
-        let dimension = self.chart.dimension() as i32;
+        let dimension = self.chart.counting().len() as i32;
         let part = |(share, width): (f64, f64)| {
             share * (-0.5 * squared / (width * width)).exp() / width.powi(dimension)
         };
         let mixture: f64 = WIDTHS.into_iter().map(part).sum();
-        mixture.max(f64::MIN_POSITIVE).ln() + 0.5 * self.log_determinant()
-            - 0.5 * f64::from(dimension) * std::f64::consts::TAU.ln()
-            - log_volume
+        mixture.max(f64::MIN_POSITIVE).ln() - self.log_gaussian() - log_volume
     }
 
     /// Whether another peak is the same one.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let radius = |peak: &Self| peak.touch.distance.max(1e-3).ln();
-        self.obstacle.link == other.obstacle.link
-            && self.obstacle.likeness == other.obstacle.likeness
-            && self.obstacle.core.axis.is_some() == other.obstacle.core.axis.is_some()
+        self.is_akin(&other.obstacle)
             && (self.touch.point - other.touch.point).norm() < 4e-3
             && (radius(self) - radius(other)).abs() < 0.5
     }
@@ -225,7 +232,18 @@ impl Peak {
         self.obstacle.link == obstacle.link
             && self.obstacle.likeness == obstacle.likeness
             && self.obstacle.core.axis.is_some() == obstacle.core.axis.is_some()
+            && self.obstacle.core.drift.is_some() == obstacle.core.drift.is_some()
     }
+}
+
+/// Evaluations that one Newton step takes, in the mean over some peaks.
+pub(super) fn step_cost(peaks: &[Peak]) -> usize {
+    let of_one = |peak: &Peak| {
+        let dimension = peak.counting().len();
+        // The derivatives, and about two on the way.
+        3 + dimension * (dimension + 3) / 2
+    };
+    peaks.iter().map(of_one).sum::<usize>() / peaks.len().max(1)
 }
 
 /// Most peaks kept from keyframe to keyframe.

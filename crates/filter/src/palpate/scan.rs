@@ -1,10 +1,11 @@
 //! Where on the robot the newest torques could come from: every triangle is asked, and the best are climbed from.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 use rand::{Rng, RngExt};
 
 use super::history::{History, Place};
 use super::likeness::Likeness;
+use super::obstacle::Obstacle;
 use super::peaks::Peak;
 use crate::random::{Purpose, stream};
 
@@ -24,6 +25,9 @@ pub(super) const MOST_LEFT: [usize; 7] = [40, 40, 16, 16, 16, 16, 16];
 pub(super) const BAR_ROUNDS: usize = 8;
 /// Ball peaks that bars are tried in the place of.
 pub(super) const BARS: usize = 8;
+/// Peaks at rest that drifting ones are tried in the place of, and the rounds of their climbs.
+pub(super) const DRIFTS: usize = 8;
+pub(super) const DRIFT_ROUNDS: usize = 6;
 
 /// Extra standard deviation, Nm, and as a share of the torque, for what one keyframe alone cannot tell: bias and
 /// friction.
@@ -81,6 +85,11 @@ pub(super) fn bar(history: &History, ball: &Peak) -> Peak {
         Peak::new(history.reshaped(&ball.obstacle, turn), history)
     };
     best((0..DIRECTIONS).map(start))
+}
+
+/// Where a climb as a drifting obstacle begins from one at rest.
+pub(super) fn drifting(history: &History, resting: &Obstacle) -> Peak {
+    Peak::new(resting.drifting(Some(Vector3::zeros())), history)
 }
 
 fn best(starts: impl Iterator<Item = Peak>) -> Peak {

@@ -6,8 +6,7 @@ use rayon::prelude::*;
 use super::agenda::Phase;
 use super::history::History;
 use super::obstacle::Obstacle;
-use super::peaks::{MOST, Peak, keep_best, keep_likely};
-use super::work::STEP_COST;
+use super::peaks::{MOST, Peak, keep_best, keep_likely, step_cost};
 use super::{PalpateFilter, history, scan};
 use crate::random::{Purpose, stream};
 use crate::step::Step;
@@ -84,6 +83,25 @@ impl PalpateFilter {
             return self.agenda.enter(Phase::Bars(round + 1));
         }
         self.renew_peaks();
+        self.agenda.enter(Phase::Drifts(0));
+    }
+
+    /// After that, climbs as drifting obstacles from where the best that rest are.
+    pub(super) fn drifts(&mut self, step: &Step, round: usize) {
+        let resting: Vec<Obstacle> = (self.peaks.iter().map(|peak| peak.obstacle))
+            .filter(|obstacle| obstacle.core.drift.is_none())
+            .take(scan::DRIFTS)
+            .collect();
+        let start = |_: &Self, index: usize, history: &History| {
+            scan::drifting(history, &resting[index])
+        };
+        if !self.climb_on(step, round, resting.len(), start) {
+            return;
+        }
+        if round + 1 < scan::DRIFT_ROUNDS {
+            return self.agenda.enter(Phase::Drifts(round + 1));
+        }
+        self.renew_peaks();
         self.agenda.enter(Phase::Sight);
     }
 
@@ -100,7 +118,11 @@ impl PalpateFilter {
             0 => starts,
             _ => self.bench.climbs.len(),
         };
-        let portion = self.portion(total, STEP_COST);
+        let cost = match round {
+            0 => step_cost(&self.peaks),
+            _ => step_cost(&self.bench.climbs),
+        };
+        let portion = self.portion(total, cost);
         let history = history(step, &self.memory, &self.noise);
         if round == 0 {
             let begin = |index| start(self, index, &history);

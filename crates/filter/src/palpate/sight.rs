@@ -1,9 +1,10 @@
 //! What the torques can see of a contact at all: how far off it would be put by torques that are a little wrong.
 
-use nalgebra::{Matrix3, Matrix6, Vector4, Vector6};
+use nalgebra::{Matrix3, SMatrix, SVector};
 
+use super::chart::{COORDINATES, Coordinates};
 use super::history::History;
-use super::obstacle::Obstacle;
+use super::obstacle::{DRIFT_STD, Obstacle};
 use super::peaks::{Peak, STEPS};
 
 /// Systematic error of the torques that is always reckoned with: a share of each joint's rms torque, and Nm. With
@@ -11,9 +12,16 @@ use super::peaks::{Peak, STEPS};
 /// stiffness that is not linear, delays, wrong masses.
 const ERROR_SHARE: f64 = 0.02;
 const ERROR: f64 = 0.01;
+/// Precision of each component of a velocity before any torque is seen, s²/m².
+const STILL: f64 = 1.0 / (DRIFT_STD * DRIFT_STD);
 /// Precisions before any torque is seen: of a place on the link (1/m²), of the radius' logarithm, of a bar's
-/// direction, of the force (1/N²) and of the stiffness (m²/N²).
-const PRIOR: [f64; 6] = [25.0, 25.0, 0.4, 1.0, 3e-4, 2.5e-9];
+/// direction, of a velocity (s²/m²), of the force (1/N²) and of the stiffness (m²/N²).
+const PRIOR: [f64; UNKNOWNS] = [25.0, 25.0, 0.4, 1.0, STILL, STILL, STILL, 3e-4, 2.5e-9];
+
+/// The obstacle's coordinates, force and stiffness.
+const UNKNOWNS: usize = COORDINATES + 2;
+type Unknowns = SVector<f64, UNKNOWNS>;
+type Information = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
 /// Fewest joints that must feel a contact for its place to be seen: one torque a sample cannot tell two coordinates and
 /// a force apart, whatever it does over time that a wrong model could not do as well.
@@ -32,7 +40,7 @@ pub(super) fn sight(peak: &Peak, history: &History) -> Matrix3<f64> {
         return Matrix3::identity() * UNSEEN;
     }
     let columns = derivatives(peak, history);
-    let mut information = Matrix6::from_diagonal(&Vector6::from(PRIOR));
+    let mut information = Information::from_diagonal(&PRIOR.into());
     let samples: f64 = history
         .keyframes
         .iter()
@@ -47,13 +55,13 @@ pub(super) fn sight(peak: &Peak, history: &History) -> Matrix3<f64> {
         information +=
             derivatives * derivatives.transpose() * (keyframe.samples / (samples * sigma * sigma));
     }
-    let covariance = information.try_inverse().unwrap_or_else(Matrix6::identity);
+    let covariance = information.try_inverse().unwrap_or_else(Information::identity);
     let sides = peak.sides();
     sides * covariance.fixed_view::<2, 2>(0, 0) * sides.transpose()
 }
 
 /// Derivatives of the predicted torques, one row a keyframe (newest first) and joint of the path.
-fn derivatives(peak: &Peak, history: &History) -> Vec<Vector6<f64>> {
+fn derivatives(peak: &Peak, history: &History) -> Vec<Unknowns> {
     let evidence = &peak.evidence;
     let predict = |obstacle: &Obstacle, force: f64, stiffness: f64| {
         let evidence = super::Evidence {
@@ -64,14 +72,14 @@ fn derivatives(peak: &Peak, history: &History) -> Vec<Vector6<f64>> {
         history.torques(obstacle, &evidence)
     };
     let here = predict(&peak.obstacle, evidence.force, evidence.stiffness);
-    let mut rows = vec![Vector6::zeros(); here.len()];
+    let mut rows = vec![Unknowns::zeros(); here.len()];
     let mut fill = |column: usize, torques: Vec<f64>, step: f64| {
         for ((row, torque), here) in rows.iter_mut().zip(torques).zip(&here) {
             row[column] = (torque - here) / step;
         }
     };
-    for axis in 0..peak.dimension() {
-        let mut x = Vector4::zeros();
+    for &axis in peak.counting() {
+        let mut x = Coordinates::zeros();
         x[axis] = STEPS[axis];
         fill(
             axis,
@@ -80,12 +88,12 @@ fn derivatives(peak: &Peak, history: &History) -> Vec<Vector6<f64>> {
         );
     }
     fill(
-        4,
+        COORDINATES,
         predict(&peak.obstacle, evidence.force + 1.0, evidence.stiffness),
         1.0,
     );
     fill(
-        5,
+        COORDINATES + 1,
         predict(&peak.obstacle, evidence.force, evidence.stiffness + 100.0),
         100.0,
     );

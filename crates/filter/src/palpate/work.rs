@@ -10,7 +10,7 @@ use super::history::{History, Place};
 use super::likeness::Likeness;
 use super::moves::Proposals;
 use super::obstacle::RADIUS_RANGE;
-use super::peaks::Peak;
+use super::peaks::{Peak, step_cost};
 use super::scan::Candidate;
 use super::{Hypothesis, PalpateFilter, PalpateParameters, crowd, history, sight};
 use crate::random::{Purpose, stream};
@@ -25,8 +25,6 @@ const RESAMPLE_BELOW: f64 = 0.5;
 const RESIZE_BEYOND: f64 = 0.25;
 /// What solving for force, stiffness, friction and bias costs beside the looks at the keyframes, in such looks.
 const SOLVING: usize = 3;
-/// Evaluations that one Newton step takes.
-pub(super) const STEP_COST: usize = 14;
 /// Evaluations that a look at the systematic errors takes.
 const SIGHT_COST: usize = 7;
 
@@ -64,6 +62,7 @@ impl PalpateFilter {
             Phase::Ask => self.ask(step),
             Phase::Scan(round) => self.scan(step, round),
             Phase::Bars(round) => self.bars(step, round),
+            Phase::Drifts(round) => self.drifts(step, round),
             Phase::Sight => self.sight(step),
             Phase::Move(round) => self.mutate(step, round),
         }
@@ -152,7 +151,7 @@ impl PalpateFilter {
     /// Keeps the peaks on top of the evidence, which each keyframe changes.
     fn climb(&mut self, step: &Step) {
         let total = self.peaks.len();
-        let portion = self.portion(total, STEP_COST);
+        let portion = self.portion(total, step_cost(&self.peaks));
         let history = history(step, &self.memory, &self.noise);
         self.peaks[portion]
             .par_iter_mut()
