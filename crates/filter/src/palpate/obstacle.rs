@@ -16,8 +16,8 @@ use crate::skin::Skin;
 const STICKING_SPEED: f64 = 2e-4;
 /// Half the length of a bar, m.
 const BAR_HALF_LENGTH: f64 = 0.3;
-/// How exactly the contact along a bar is found, m; it costs a projection an iteration.
-const BAR_TOLERANCE: f64 = 1e-5;
+/// Most projections that finding the contact along a bar costs.
+const MOST_BAR_LOOKS: usize = 16;
 /// Typical radius of a link, m.
 pub(super) const LINK_RADIUS: f64 = 0.07;
 /// Share of obstacles that drift, and the standard deviation of each component of their velocity, m/s.
@@ -108,21 +108,45 @@ pub(super) fn touch(shape: &Shape, core_in_link: &Core, start: u32, along: f64) 
         (Touch { along, ..touch }, miss)
     };
     let (mut best, mut miss) = at(along, start);
-    let mut slope = -0.5;
-    for _ in 0..6 {
-        if miss.abs() < BAR_TOLERANCE {
+    // On a convex link the miss falls along the bar: steeply where the contact is on an edge or a corner of the mesh,
+    // hardly where it is on a triangle. So a step may be far too short, and the next one goes farther, until the sign
+    // changes; from then on the contact lies between two places.
+    let mut other: Option<(f64, f64)> = None;
+    let mut stride = 2.0;
+    for _ in 0..MOST_BAR_LOOKS {
+        if miss.abs() < bar_tolerance(best.distance) {
             break;
         }
-        let next = (best.along - miss / slope).clamp(-BAR_HALF_LENGTH, BAR_HALF_LENGTH);
+        let next = match other {
+            None => best.along + stride * miss,
+            Some((there, its_miss)) => between((best.along, miss), (there, its_miss)),
+        };
+        let next = next.clamp(-BAR_HALF_LENGTH, BAR_HALF_LENGTH);
         if next == best.along {
             break;
         }
         let (touch, next_miss) = at(next, best.triangle);
-        // On a convex link the slope lies between −1 and 0.
-        slope = ((next_miss - miss) / (next - best.along)).clamp(-1.0, -0.05);
+        if (next_miss < 0.0) != (miss < 0.0) {
+            other = Some((best.along, miss));
+        } else if let Some((_, its_miss)) = &mut other {
+            // The far end weighs half, so that it is left behind (the Illinois method: Dowell and Jarratt 1971).
+            *its_miss *= 0.5;
+        } else {
+            stride *= 4.0;
+        }
         (best, miss) = (touch, next_miss);
     }
     best
+}
+
+/// Where a line through two values of opposite sign is zero.
+fn between((a, at_a): (f64, f64), (b, at_b): (f64, f64)) -> f64 {
+    a - at_a * (b - a) / (at_b - at_a)
+}
+
+/// How exactly the contact along a bar is found, m: so that the normal is right to a ten-thousandth of a radian.
+fn bar_tolerance(distance: f64) -> f64 {
+    (1e-4 * distance.abs()).clamp(1e-8, 1e-5)
 }
 
 /// The contact with a ball around `centre`.
