@@ -11,6 +11,8 @@ const LOOKS_PER_SEC: f64 = 1.5e6;
 pub(super) enum Phase {
     /// Nothing to do before the next keyframe.
     Idle,
+    /// See how loud the noise is.
+    Calibrate,
     /// Draw the first particles.
     Spread,
     /// Evaluate each particle against the new keyframe, then resample.
@@ -21,7 +23,9 @@ pub(super) enum Phase {
     Hop(usize),
     /// Scan the links for candidates.
     Ask,
-    /// Climb from the candidates of a scan, so many rounds, each with fewer of them.
+    /// See which candidates of a scan are worth a climb.
+    Screen,
+    /// Climb from those, so many rounds, each with fewer of them.
     Scan(usize),
     /// Climb as bars from the best balls, so many rounds.
     Bars(usize),

@@ -139,7 +139,7 @@ impl PalpateFilter {
         }
     }
 
-    /// Judges and calibrates by the new keyframe, and puts the work that it causes on the agenda.
+    /// Judges by the new keyframe, and puts the work that it causes on the agenda.
     fn take_in_keyframe(&mut self, step: &Step) {
         self.key = step.number;
         self.keyframes += 1;
@@ -151,8 +151,6 @@ impl PalpateFilter {
                 self.misfits += 1;
             } else {
                 self.misfits = 0;
-                let inflation = self.noise.calibrated(&obstacle, &evidence, &history);
-                self.noise.inflate(inflation);
             }
         }
         if self.misfits >= MISFITS {
@@ -162,11 +160,18 @@ impl PalpateFilter {
             self.keyframes = 1;
         }
         self.noise.sum(&self.memory.keyframes);
-        self.agenda.enter(if self.particles.is_empty() {
-            Phase::Spread
-        } else {
-            Phase::Reweigh
+        self.agenda.enter(match self.misfits {
+            0 => Phase::Calibrate,
+            _ => self.weighing(),
         });
+    }
+
+    /// The phase in which the particles take the newest keyframe in.
+    fn weighing(&self) -> Phase {
+        match self.particles.is_empty() {
+            true => Phase::Spread,
+            false => Phase::Reweigh,
+        }
     }
 
     /// The hypothesis with the largest evidence.

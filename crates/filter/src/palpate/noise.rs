@@ -89,7 +89,17 @@ impl BiasPrior {
     }
 }
 
+/// What the noise is by one hypothesis, and how well that explains the torques.
+#[derive(Clone, Debug)]
+pub(super) struct Calibration {
+    /// Log of the hypothesis' evidence with this noise.
+    pub(super) log: f64,
+    /// Factor on the variance of each joint's noise.
+    pub(super) inflation: Vec<f64>,
+}
+
 /// The noise model and the sums over the history that do not depend on a hypothesis.
+#[derive(Clone)]
 pub(super) struct Noise {
     /// Variance of a sample's white noise, Nm².
     white: Vec<f64>,
@@ -202,9 +212,23 @@ impl Noise {
         sum / f64::max(count, 1.0)
     }
 
-    /// How much larger than expected the residuals of the best hypothesis are, joint by joint: the inflation to be
-    /// set with [`Noise::inflate`].
-    pub(super) fn calibrated(
+    /// How loud the noise is if a hypothesis is true. Each is judged by its own noise: by that of another one, which leaves
+    /// more unexplained, it would hardly be better.
+    pub(super) fn calibration(&self, mut obstacle: Obstacle, history: &History) -> Calibration {
+        let evidence = history.evidence(&mut obstacle);
+        let inflation = self.inflation_by(&obstacle, &evidence, history);
+        let mut noise = self.clone();
+        noise.inflate(&inflation, history.keyframes);
+        let own = History {
+            noise: &noise,
+            ..*history
+        };
+        let log = own.evidence(&mut obstacle).log;
+        Calibration { log, inflation }
+    }
+
+    /// How much larger than expected the residuals of a hypothesis are, joint by joint.
+    fn inflation_by(
         &self,
         obstacle: &Obstacle,
         evidence: &Evidence,
@@ -223,8 +247,14 @@ impl Noise {
     }
 
     /// Sets the factors on the variance of each joint's noise.
-    pub(super) fn inflate(&mut self, inflation: Vec<f64>) {
-        self.inflation = inflation;
+    pub(super) fn inflate(&mut self, inflation: &[f64], keyframes: &[Keyframe]) {
+        self.inflation.copy_from_slice(inflation);
+        self.sum(keyframes);
+    }
+
+    /// The largest factor on a joint's variance.
+    pub(super) fn most_inflated(&self) -> f64 {
+        self.inflation.iter().copied().fold(1.0, f64::max)
     }
 
     /// What the best hypothesis leaves of a keyframe's torque on one joint beyond the noise expected, Nm.

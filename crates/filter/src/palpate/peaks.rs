@@ -268,6 +268,15 @@ pub(super) fn keep_best(peaks: &mut Vec<Peak>, most: usize) {
     *peaks = kept;
 }
 
+/// Leaves at most `most` balls and as many bars.
+pub(super) fn keep_best_of_each(peaks: &mut Vec<Peak>, most: usize) {
+    let is_bar = |peak: &mut Peak| peak.obstacle.core.axis.is_some();
+    let mut bars: Vec<Peak> = peaks.extract_if(.., is_bar).collect();
+    keep_best(&mut bars, most);
+    keep_best(peaks, most);
+    peaks.append(&mut bars);
+}
+
 /// Leaves out the faint ones of peaks that [`keep_best`] has put in order.
 pub(super) fn keep_likely(peaks: &mut Vec<Peak>) {
     let Some(best) = peaks.first().map(|peak| peak.log_mass) else {

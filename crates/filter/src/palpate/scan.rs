@@ -9,25 +9,35 @@ use super::obstacle::Obstacle;
 use super::peaks::Peak;
 use crate::random::{Purpose, stream};
 
-/// Keyframes since the contact began after which a scan is due; later every so many.
+/// Keyframes since the contact began after which a scan is due; later every so many, and more often while the best
+/// that was found leaves so much more unexplained than the noise, as a factor on the variance.
 const FIRST: [usize; 8] = [1, 2, 3, 5, 7, 10, 14, 19];
 const EVERY: usize = 10;
+const EVERY_IF_POOR: usize = 3;
+const POOR: f64 = 4.0;
 /// Candidates of each link: the best minima of the misfit, and triangles drawn as likely as they are.
 const MINIMA: usize = 4;
-const DRAWN: usize = 3;
+const DRAWN: usize = 8;
 /// Radii that a climb may start with, m.
 const RADII: [f64; 3] = [0.006, 0.04, 0.25];
 /// Directions that a bar may start with.
 const DIRECTIONS: usize = 4;
-/// How many of the best climbs go on after each round of a scan: successive halving (Jamieson and Talwalkar 2016).
-pub(super) const MOST_LEFT: [usize; 7] = [40, 40, 16, 16, 16, 16, 16];
+/// Evaluations that it takes to see whether a candidate is worth a climb, in the mean over balls and bars.
+pub(super) const SCREENING: usize = RADII.len() * (1 + DIRECTIONS) / 2;
+/// How many of the best climbs, of balls and of bars, go on after each round of a scan: successive halving (Jamieson and
+/// Talwalkar 2016).
+pub(super) const MOST_LEFT: [usize; 8] = [20, 20, 12, 12, 8, 8, 8, 8];
 /// Rounds of the bars' climbs.
 pub(super) const BAR_ROUNDS: usize = 8;
 /// Ball peaks that bars are tried in the place of.
 pub(super) const BARS: usize = 8;
+/// What it costs to begin a climb as a bar, in evaluations.
+pub(super) const BAR_COST: usize = DIRECTIONS + 17;
 /// Peaks at rest that drifting ones are tried in the place of, and the rounds of their climbs.
 pub(super) const DRIFTS: usize = 8;
 pub(super) const DRIFT_ROUNDS: usize = 6;
+/// What it costs to begin one of them.
+pub(super) const DRIFT_COST: usize = 32;
 
 /// Extra standard deviation, Nm, and as a share of the torque, for what one keyframe alone cannot tell: bias and
 /// friction.
@@ -39,31 +49,39 @@ const SLACK_SHARE: f64 = 0.05;
 pub(super) struct Candidate {
     link: usize,
     likeness: Likeness,
+    is_bar: bool,
     triangle: u32,
     /// Squared normalised error that a push on the triangle's centre leaves.
     misfit: f64,
 }
 
-/// Whether a scan is due after so many keyframes.
-pub(super) fn is_due(keyframes: usize) -> bool {
-    FIRST.contains(&keyframes) || keyframes.is_multiple_of(EVERY)
+/// Whether a scan is due after so many keyframes, by the best hypothesis' inflation of the noise.
+pub(super) fn is_due(keyframes: usize, inflation: f64) -> bool {
+    let every = if inflation > POOR {
+        EVERY_IF_POOR
+    } else {
+        EVERY
+    };
+    FIRST.contains(&keyframes) || keyframes.is_multiple_of(every)
 }
 
-/// Triangles of a link that a push on explains the newest torques, whatever the link is taken for.
+/// Triangles of a link that a push on explains the newest torques, whatever link and obstacle are taken for.
 pub(super) fn candidates(history: &History, link: usize, seed: u64, key: u64) -> Vec<Candidate> {
     let flat = of_link(history, link, &mut stream(seed, key, link, Purpose::Fresh));
-    let taken_for = |likeness| {
+    let kinds = Likeness::ALL.map(|likeness| [false, true].map(|is_bar| (likeness, is_bar)));
+    let taken_for = |(likeness, is_bar)| {
         let candidate = move |&candidate: &Candidate| Candidate {
             likeness,
+            is_bar,
             ..candidate
         };
         flat.iter().map(candidate)
     };
-    Likeness::ALL.into_iter().flat_map(taken_for).collect()
+    kinds.into_iter().flatten().flat_map(taken_for).collect()
 }
 
-/// Where a climb from a candidate as a ball begins.
-pub(super) fn ball(history: &History, candidate: &Candidate) -> Peak {
+/// Where a climb from a candidate begins.
+pub(super) fn start(history: &History, candidate: &Candidate) -> Peak {
     let &Candidate { link, likeness, .. } = candidate;
     let triangle = candidate.triangle;
     let surface = history.skin.surface(link);
@@ -74,18 +92,37 @@ pub(super) fn ball(history: &History, candidate: &Candidate) -> Peak {
         point: surface.centroid(triangle),
         normal: surface.normal(triangle),
     };
-    let start = |radius| Peak::new(history.obstacle_at(&place, radius, None), history);
-    best(RADII.map(start).into_iter())
+    let turns = if candidate.is_bar {
+        &TURNS[1..]
+    } else {
+        &TURNS[..1]
+    };
+    let of_radius = |radius| {
+        let start = move |&turn: &Option<f64>| {
+            Peak::new(history.obstacle_at(&place, radius, turn), history)
+        };
+        turns.iter().map(start)
+    };
+    best(RADII.into_iter().flat_map(of_radius))
 }
 
 /// Where a climb as a bar from a peak begins.
 pub(super) fn bar(history: &History, ball: &Peak) -> Peak {
-    let start = |direction: usize| {
-        let turn = Some(std::f64::consts::PI * direction as f64 / DIRECTIONS as f64);
-        Peak::new(history.reshaped(&ball.obstacle, turn), history)
-    };
-    best((0..DIRECTIONS).map(start))
+    let start = |&turn: &Option<f64>| Peak::new(history.reshaped(&ball.obstacle, turn), history);
+    best(TURNS[1..].iter().map(start))
 }
+
+/// How a ball, and then how bars are turned about the normal, rad.
+const TURNS: [Option<f64>; 1 + DIRECTIONS] = {
+    let step = std::f64::consts::PI / DIRECTIONS as f64;
+    [
+        None,
+        Some(0.0),
+        Some(step),
+        Some(2.0 * step),
+        Some(3.0 * step),
+    ]
+};
 
 /// Where a climb as a drifting obstacle begins from one at rest.
 pub(super) fn drifting(history: &History, resting: &Obstacle) -> Peak {
@@ -141,6 +178,7 @@ fn of_link(history: &History, link: usize, random: &mut impl Rng) -> Vec<Candida
     let candidate = |triangle: u32| Candidate {
         link,
         likeness: Likeness::Mesh,
+        is_bar: false,
         triangle,
         misfit: misfits[triangle as usize],
     };

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::agenda::Phase;
 use super::history::History;
 use super::obstacle::Obstacle;
-use super::peaks::{MOST, Peak, keep_best, keep_likely, step_cost};
+use super::peaks::{MOST, Peak, keep_best, keep_best_of_each, keep_likely, step_cost};
 use super::{PalpateFilter, history, scan};
 use crate::random::{Purpose, stream};
 use crate::step::Step;
@@ -27,7 +27,11 @@ impl PalpateFilter {
         let start = |filter: &Self, index, history: &History| {
             Peak::new(filter.hop_start(index, history), history)
         };
-        if !self.climb_on(step, round, HOPS, start) {
+        let is_done = match round {
+            0 => self.begin_climbs(step, HOPS, step_cost(&self.peaks), start),
+            _ => self.climb_on(step),
+        };
+        if !is_done {
             return;
         }
         if round + 1 < HOP_ROUNDS {
@@ -35,10 +39,12 @@ impl PalpateFilter {
         }
         self.renew_peaks();
         self.bench.candidates.clear();
-        self.agenda.enter(match scan::is_due(self.keyframes) {
-            true => Phase::Ask,
-            false => Phase::Sight,
-        });
+        self.agenda.enter(
+            match scan::is_due(self.keyframes, self.noise.most_inflated()) {
+                true => Phase::Ask,
+                false => Phase::Sight,
+            },
+        );
     }
 
     /// Asks the triangles of some links for the candidates of a scan.
@@ -51,20 +57,31 @@ impl PalpateFilter {
         let asked = links[portion].par_iter().flat_map_iter(ask);
         self.bench.candidates.par_extend(asked);
         if self.agenda.done == links.len() {
-            self.agenda.enter(Phase::Scan(0));
+            self.agenda.enter(Phase::Screen);
+        }
+    }
+
+    /// Looks at the candidates of a scan as they are, and leaves the best to climb from.
+    pub(super) fn screen(&mut self, step: &Step) {
+        let total = self.bench.candidates.len();
+        let portion = self.portion(total, scan::SCREENING);
+        let history = history(step, &self.memory, &self.noise);
+        let start = |candidate| scan::start(&history, candidate);
+        let starts = self.bench.candidates[portion].par_iter().map(start);
+        self.bench.climbs.par_extend(starts);
+        if self.agenda.done == total {
+            keep_best_of_each(&mut self.bench.climbs, scan::MOST_LEFT[0]);
+            self.agenda.enter(Phase::Scan(1));
         }
     }
 
     /// Climbs from the candidates of a scan; after each round the best go on.
     pub(super) fn scan(&mut self, step: &Step, round: usize) {
-        let start = |filter: &Self, index: usize, history: &History| {
-            scan::ball(history, &filter.bench.candidates[index])
-        };
-        if !self.climb_on(step, round, self.bench.candidates.len(), start) {
+        if !self.climb_on(step) {
             return;
         }
         if let Some(&most) = scan::MOST_LEFT.get(round) {
-            keep_best(&mut self.bench.climbs, most);
+            keep_best_of_each(&mut self.bench.climbs, most);
             return self.agenda.enter(Phase::Scan(round + 1));
         }
         self.renew_peaks();
@@ -76,7 +93,16 @@ impl PalpateFilter {
         let start = |filter: &Self, index: usize, history: &History| {
             scan::bar(history, &filter.peaks[index])
         };
-        if !self.climb_on(step, round, scan::BARS.min(self.peaks.len()), start) {
+        let is_done = match round {
+            0 => self.begin_climbs(
+                step,
+                scan::BARS.min(self.peaks.len()),
+                scan::BAR_COST,
+                start,
+            ),
+            _ => self.climb_on(step),
+        };
+        if !is_done {
             return;
         }
         if round + 1 < scan::BAR_ROUNDS {
@@ -92,10 +118,13 @@ impl PalpateFilter {
             .filter(|obstacle| obstacle.core.drift.is_none())
             .take(scan::DRIFTS)
             .collect();
-        let start = |_: &Self, index: usize, history: &History| {
-            scan::drifting(history, &resting[index])
+        let start =
+            |_: &Self, index: usize, history: &History| scan::drifting(history, &resting[index]);
+        let is_done = match round {
+            0 => self.begin_climbs(step, resting.len(), scan::DRIFT_COST, start),
+            _ => self.climb_on(step),
         };
-        if !self.climb_on(step, round, resting.len(), start) {
+        if !is_done {
             return;
         }
         if round + 1 < scan::DRIFT_ROUNDS {
@@ -105,30 +134,31 @@ impl PalpateFilter {
         self.agenda.enter(Phase::Sight);
     }
 
-    /// A portion of one round: in the first one so many climbs begin, and in each all go one step on. Tells whether the
-    /// round is done.
-    fn climb_on(
+    /// A portion of a round that begins so many climbs, each with its first step. Tells whether the round is done.
+    fn begin_climbs(
         &mut self,
         step: &Step,
-        round: usize,
         starts: usize,
+        cost: usize,
         start: impl Fn(&Self, usize, &History) -> Peak + Sync,
     ) -> bool {
-        let total = match round {
-            0 => starts,
-            _ => self.bench.climbs.len(),
-        };
-        let cost = match round {
-            0 => step_cost(&self.peaks),
-            _ => step_cost(&self.bench.climbs),
-        };
-        let portion = self.portion(total, cost);
+        let portion = self.portion(starts, cost);
         let history = history(step, &self.memory, &self.noise);
-        if round == 0 {
-            let begin = |index| start(self, index, &history);
-            let begun: Vec<Peak> = portion.clone().into_par_iter().map(begin).collect();
-            self.bench.climbs.extend(begun);
-        }
+        let begin = |index| {
+            let mut peak = start(self, index, &history);
+            peak.step(&history);
+            peak
+        };
+        let begun: Vec<Peak> = portion.into_par_iter().map(begin).collect();
+        self.bench.climbs.extend(begun);
+        self.agenda.done == starts
+    }
+
+    /// A portion of a round in which all climbs go one step on. Tells whether the round is done.
+    fn climb_on(&mut self, step: &Step) -> bool {
+        let total = self.bench.climbs.len();
+        let portion = self.portion(total, step_cost(&self.bench.climbs));
+        let history = history(step, &self.memory, &self.noise);
         let climbs = self.bench.climbs[portion].par_iter_mut();
         climbs
             .filter(|peak| !peak.rests)

@@ -55,7 +55,9 @@ pub(super) fn sight(peak: &Peak, history: &History) -> Matrix3<f64> {
         information +=
             derivatives * derivatives.transpose() * (keyframe.samples / (samples * sigma * sigma));
     }
-    let covariance = information.try_inverse().unwrap_or_else(Information::identity);
+    let covariance = information
+        .try_inverse()
+        .unwrap_or_else(Information::identity);
     let sides = peak.sides();
     sides * covariance.fixed_view::<2, 2>(0, 0) * sides.transpose()
 }

@@ -9,6 +9,7 @@ use super::agenda::Phase;
 use super::history::{History, Place};
 use super::likeness::Likeness;
 use super::moves::Proposals;
+use super::noise::Calibration;
 use super::obstacle::RADIUS_RANGE;
 use super::peaks::{Peak, step_cost};
 use super::scan::Candidate;
@@ -28,6 +29,9 @@ const SOLVING: usize = 3;
 /// Evaluations that a look at the systematic errors takes.
 const SIGHT_COST: usize = 7;
 
+/// Evaluations that it takes to see how loud the noise is by a peak.
+const CALIBRATION_COST: usize = 3;
+
 /// What the present phase has made so far, to take effect when it is complete, and what later phases start from.
 #[derive(Default)]
 pub(super) struct Workbench {
@@ -40,6 +44,8 @@ pub(super) struct Workbench {
     occupied: Vec<((u16, u32), f64)>,
     /// The particles as they were before the moves.
     others: Vec<Hypothesis>,
+    /// What the noise is by each peak.
+    calibrations: Vec<Calibration>,
 }
 
 impl Workbench {
@@ -47,6 +53,7 @@ impl Workbench {
         self.particles.clear();
         self.candidates.clear();
         self.climbs.clear();
+        self.calibrations.clear();
     }
 }
 
@@ -55,11 +62,13 @@ impl PalpateFilter {
     pub(super) fn work(&mut self, step: &Step) {
         match self.agenda.phase {
             Phase::Idle => {}
+            Phase::Calibrate => self.calibrate(step),
             Phase::Spread => self.spread(step),
             Phase::Reweigh => self.reweigh(step),
             Phase::Climb => self.climb(step),
             Phase::Hop(round) => self.hop(step, round),
             Phase::Ask => self.ask(step),
+            Phase::Screen => self.screen(step),
             Phase::Scan(round) => self.scan(step, round),
             Phase::Bars(round) => self.bars(step, round),
             Phase::Drifts(round) => self.drifts(step, round),
@@ -72,6 +81,30 @@ impl PalpateFilter {
     pub(super) fn portion(&mut self, units: usize, evaluations: usize) -> Range<usize> {
         self.agenda
             .take(units, evaluations * (self.memory.keyframes.len() + SOLVING))
+    }
+
+    /// Sees how loud the noise is by each peak, and goes by the one that is best with its own.
+    fn calibrate(&mut self, step: &Step) {
+        let total = self.peaks.len();
+        let portion = self.portion(total, CALIBRATION_COST);
+        let history = history(step, &self.memory, &self.noise);
+        let calibration = |peak: &Peak| {
+            let mut calibration = self.noise.calibration(peak.obstacle, &history);
+            // The peak's width counts as it does for its mass.
+            calibration.log += peak.log_mass - peak.evidence.log;
+            calibration
+        };
+        let calibrations = self.peaks[portion].par_iter().map(calibration);
+        self.bench.calibrations.par_extend(calibrations);
+        if self.agenda.done < total {
+            return;
+        }
+        let best = (self.bench.calibrations.iter()).max_by(|a, b| a.log.total_cmp(&b.log));
+        if let Some(best) = best {
+            self.noise.inflate(&best.inflation, &self.memory.keyframes);
+        }
+        self.bench.calibrations.clear();
+        self.agenda.enter(self.weighing());
     }
 
     /// Particles all over the robot, with any radius, as likely as the first keyframe says.
