@@ -15,9 +15,9 @@ const FIRST: [usize; 8] = [1, 2, 3, 5, 7, 10, 14, 19];
 const EVERY: usize = 10;
 const EVERY_IF_POOR: usize = 3;
 const POOR: f64 = 4.0;
-/// Candidates of each link: the best minima of the misfit, and triangles drawn as likely as they are.
-const MINIMA: usize = 4;
-const DRAWN: usize = 8;
+/// Candidates of each link for each question: the best minima of the misfit, and triangles drawn as likely as they are.
+const MINIMA: usize = 3;
+const DRAWN: usize = 4;
 /// Radii that a climb may start with, m.
 const RADII: [f64; 3] = [0.006, 0.04, 0.25];
 /// Directions that a bar may start with.
@@ -40,9 +40,90 @@ pub(super) const DRIFT_ROUNDS: usize = 6;
 pub(super) const DRIFT_COST: usize = 32;
 
 /// Extra standard deviation, Nm, and as a share of the torque, for what one keyframe alone cannot tell: bias and
-/// friction.
-const SLACK: f64 = 0.05;
+/// friction. How large a bias is, nobody knows.
+const SLACKS: [f64; 2] = [0.05, 0.3];
 const SLACK_SHARE: f64 = 0.05;
+
+/// Torques for which a push is looked for on each triangle.
+struct Question {
+    /// By joint, Nm.
+    torque: Vec<f64>,
+    /// Inverse variances.
+    weight: Vec<f64>,
+    /// Whether a push may be negative, as the change of one may.
+    may_pull: bool,
+}
+
+/// Number of [questions](Question::new).
+pub(super) const QUESTIONS: usize = SLACKS.len() + 1;
+
+impl Question {
+    /// The newest torques, with either slack; or what they changed by since the keyframe that they differ most from, as a
+    /// bias is not in that.
+    fn new(history: &History, number: usize) -> Self {
+        let torque = &history.newest().torque;
+        let slack = SLACKS.get(number);
+        let weight = |(joint, torque): (usize, &f64)| {
+            let slack = slack.unwrap_or(&SLACKS[0]).powi(2) + (SLACK_SHARE * torque).powi(2);
+            1.0 / (1.0 / history.noise.weight(history.keyframes.len() - 1, joint) + slack)
+        };
+        Self {
+            weight: torque.iter().enumerate().map(weight).collect(),
+            may_pull: slack.is_none(),
+            torque: match slack {
+                Some(_) => torque.clone(),
+                None => largest_change(history),
+            },
+        }
+    }
+
+    /// Squared normalised error that the best push along some force and moment leaves.
+    fn misfit(&self, terms: &Terms, push: &Vector6<f64>) -> f64 {
+        let along = terms.g.dot(push);
+        let along = if self.may_pull { along } else { along.max(0.0) };
+        terms.measured - along * along / push.dot(&(terms.a * push)).max(1e-12)
+    }
+}
+
+/// What the newest torques changed by since the keyframe that they differ most from, Nm.
+fn largest_change(history: &History) -> Vec<f64> {
+    let newest = &history.newest().torque;
+    let changes = history.keyframes.iter().map(|keyframe| {
+        let pairs = newest.iter().zip(&keyframe.torque);
+        pairs.map(|(now, before)| now - before).collect::<Vec<_>>()
+    });
+    let size = |change: &Vec<f64>| change.iter().map(|x| x * x).sum::<f64>();
+    let largest = changes.max_by(|a, b| size(a).total_cmp(&size(b)));
+    largest.unwrap_or_default()
+}
+
+/// What a question comes to for the links of one path: A = S W Sᵀ, g = S W τ and τᵀ W τ.
+struct Terms {
+    a: Matrix6<f64>,
+    g: Vector6<f64>,
+    measured: f64,
+}
+
+impl Terms {
+    fn new(question: &Question, history: &History, link: usize) -> Self {
+        let Question { torque, weight, .. } = question;
+        let (mut a, mut g) = (Matrix6::zeros(), Vector6::zeros());
+        let screws = &history.newest().links[link].screws;
+        for (column, &joint) in screws.column_iter().zip(&history.robot.links[link].path) {
+            a += column * column.transpose() * weight[joint];
+            g += column * (weight[joint] * torque[joint]);
+        }
+        let squares = torque
+            .iter()
+            .zip(weight)
+            .map(|(torque, weight)| weight * torque * torque);
+        Self {
+            a,
+            g,
+            measured: squares.sum(),
+        }
+    }
+}
 
 /// A triangle that explains a keyframe's torques better than its neighbours do.
 #[derive(Clone, Copy, Debug)]
@@ -51,8 +132,6 @@ pub(super) struct Candidate {
     likeness: Likeness,
     is_bar: bool,
     triangle: u32,
-    /// Squared normalised error that a push on the triangle's centre leaves.
-    misfit: f64,
 }
 
 /// Whether a scan is due after so many keyframes, by the best hypothesis' inflation of the noise.
@@ -65,9 +144,16 @@ pub(super) fn is_due(keyframes: usize, inflation: f64) -> bool {
     FIRST.contains(&keyframes) || keyframes.is_multiple_of(every)
 }
 
-/// Triangles of a link that a push on explains the newest torques, whatever link and obstacle are taken for.
-pub(super) fn candidates(history: &History, link: usize, seed: u64, key: u64) -> Vec<Candidate> {
-    let flat = of_link(history, link, &mut stream(seed, key, link, Purpose::Fresh));
+/// Triangles of a link that a push on answers a question, whatever link and obstacle are taken for.
+pub(super) fn candidates(
+    history: &History,
+    link: usize,
+    question: usize,
+    (seed, key): (u64, u64),
+) -> Vec<Candidate> {
+    let mut random = stream(seed, key, link * QUESTIONS + question, Purpose::Fresh);
+    let question = Question::new(history, question);
+    let flat = of_link(history, link, &question, &mut random);
     let kinds = Likeness::ALL.map(|likeness| [false, true].map(|is_bar| (likeness, is_bar)));
     let taken_for = |(likeness, is_bar)| {
         let candidate = move |&candidate: &Candidate| Candidate {
@@ -142,37 +228,21 @@ fn best(starts: impl Iterator<Item = Peak>) -> Peak {
         .expect("a climb has at least one start")
 }
 
-/// Triangles of one link that a push on explains the newest torques.
-fn of_link(history: &History, link: usize, random: &mut impl Rng) -> Vec<Candidate> {
-    let (surface, keyframe) = (history.skin.surface(link), history.newest());
-    let view = &keyframe.links[link];
-    let mut a = Matrix6::zeros();
-    let mut g = Vector6::zeros();
-    let mut measured = 0.0;
-    let weight = |joint: usize| {
-        let torque = keyframe.torque[joint];
-        let slack = SLACK * SLACK + (SLACK_SHARE * torque).powi(2);
-        1.0 / (1.0 / history.noise.weight(history.keyframes.len() - 1, joint) + slack)
-    };
-    for (column, &joint) in view
-        .screws
-        .column_iter()
-        .zip(&history.robot.links[link].path)
-    {
-        a += column * column.transpose() * weight(joint);
-        g += column * (weight(joint) * keyframe.torque[joint]);
-    }
-    for (joint, torque) in keyframe.torque.iter().enumerate() {
-        measured += weight(joint) * torque * torque;
-    }
+/// Triangles of one link that a push on answers a question: the best minima, and some drawn.
+fn of_link(
+    history: &History,
+    link: usize,
+    question: &Question,
+    random: &mut impl Rng,
+) -> Vec<Candidate> {
+    let surface = history.skin.surface(link);
+    let terms = Terms::new(question, history, link);
     let misfit = |triangle: u32| {
         let centre = surface.centroid(triangle);
         let push = -surface.normal(triangle).into_inner();
         let moment = centre.coords.cross(&push);
-        let w = Vector6::new(push.x, push.y, push.z, moment.x, moment.y, moment.z);
-        // The best force, which cannot pull.
-        let along = g.dot(&w).max(0.0);
-        measured - along * along / w.dot(&(a * w)).max(1e-12)
+        let push = Vector6::new(push.x, push.y, push.z, moment.x, moment.y, moment.z);
+        question.misfit(&terms, &push)
     };
     let misfits: Vec<f64> = (0..surface.triangle_count() as u32).map(misfit).collect();
     let candidate = |triangle: u32| Candidate {
@@ -180,7 +250,6 @@ fn of_link(history: &History, link: usize, random: &mut impl Rng) -> Vec<Candida
         likeness: Likeness::Mesh,
         is_bar: false,
         triangle,
-        misfit: misfits[triangle as usize],
     };
     let is_minimum = |&triangle: &u32| {
         let own = misfits[triangle as usize];
@@ -189,8 +258,8 @@ fn of_link(history: &History, link: usize, random: &mut impl Rng) -> Vec<Candida
             .all(|other| own <= misfits[other as usize])
     };
     let all = 0..misfits.len() as u32;
-    let mut minima: Vec<Candidate> = all.clone().filter(is_minimum).map(candidate).collect();
-    minima.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    let mut minima: Vec<u32> = all.clone().filter(is_minimum).collect();
+    minima.sort_by(|&a, &b| misfits[a as usize].total_cmp(&misfits[b as usize]));
     minima.truncate(MINIMA);
     // Where many triangles fit alike, any of them may be meant: some are drawn as likely as they are, by the
     // largest sums of log weight and Gumbel noise (Yellott 1977).
@@ -208,11 +277,6 @@ fn of_link(history: &History, link: usize, random: &mut impl Rng) -> Vec<Candida
     if drawn.len() > DRAWN {
         drawn.select_nth_unstable_by(DRAWN - 1, largest_first);
     }
-    minima.extend(
-        drawn
-            .iter()
-            .take(DRAWN)
-            .map(|&(_, triangle)| candidate(triangle)),
-    );
-    minima
+    minima.extend(drawn.iter().take(DRAWN).map(|&(_, triangle)| triangle));
+    minima.into_iter().map(candidate).collect()
 }

@@ -50,13 +50,17 @@ impl PalpateFilter {
     /// Asks the triangles of some links for the candidates of a scan.
     pub(super) fn ask(&mut self, step: &Step) {
         let links = step.skin.links();
-        let portion = self.agenda.take(links.len(), ASKING);
+        let total = links.len() * scan::QUESTIONS;
+        let portion = self.agenda.take(total, ASKING);
         let history = history(step, &self.memory, &self.noise);
-        let (seed, key) = (self.seed, self.key);
-        let ask = |&link: &usize| scan::candidates(&history, link, seed, key);
-        let asked = links[portion].par_iter().flat_map_iter(ask);
+        let keys = (self.seed, self.key);
+        let ask = |index| {
+            let link = links[index / scan::QUESTIONS];
+            scan::candidates(&history, link, index % scan::QUESTIONS, keys)
+        };
+        let asked = portion.into_par_iter().flat_map_iter(ask);
         self.bench.candidates.par_extend(asked);
-        if self.agenda.done == links.len() {
+        if self.agenda.done == total {
             self.agenda.enter(Phase::Screen);
         }
     }
