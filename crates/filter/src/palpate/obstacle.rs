@@ -20,8 +20,10 @@ const BAR_HALF_LENGTH: f64 = 0.3;
 const MOST_BAR_LOOKS: usize = 16;
 /// Typical radius of a link, m.
 pub(super) const LINK_RADIUS: f64 = 0.07;
-/// Share of obstacles that drift, and the standard deviation of each component of their velocity, m/s.
-const DRIFTING: f64 = 0.1;
+/// Log of the odds that an obstacle drifts, and the standard deviation of each component of its velocity, m/s. Most
+/// rest, and what friction and the mesh get wrong looks like a drift of a millimetre a second; with much longer odds a real
+/// drift is taken for a new contact again and again.
+const LOG_DRIFTING: f64 = -6.0;
 pub(super) const DRIFT_STD: f64 = 5e-3;
 /// Smallest and largest radius of an obstacle's curvature, m.
 pub(super) const RADIUS_RANGE: [f64; 2] = [1e-3, 1.0];
@@ -377,10 +379,10 @@ impl Core {
     /// Log of the prior density of how it moves: most obstacles rest.
     pub(super) fn log_drift_prior(&self) -> f64 {
         match self.drift {
-            None => (1.0 - DRIFTING).ln(),
+            None => 0.0,
             Some(drift) => {
                 let normalisation = 3.0 * (DRIFT_STD * std::f64::consts::TAU.sqrt()).ln();
-                DRIFTING.ln() - normalisation - 0.5 * drift.norm_squared() / (DRIFT_STD * DRIFT_STD)
+                LOG_DRIFTING - normalisation - 0.5 * drift.norm_squared() / (DRIFT_STD * DRIFT_STD)
             }
         }
     }

@@ -219,10 +219,15 @@ impl Peak {
         mixture.max(f64::MIN_POSITIVE).ln() - self.log_gaussian() - log_volume
     }
 
-    /// Whether another peak is the same one.
+    /// Whether another peak is the same one; or would be, if it rested as this one does, and explains hardly more.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let radius = |peak: &Self| peak.touch.distance.max(1e-3).ln();
-        self.is_akin(&other.obstacle)
+        let explains_more = other.evidence.log > self.evidence.log + WORTH_DRIFTING;
+        let drift = match self.obstacle.core.drift {
+            None if !explains_more => None,
+            _ => other.obstacle.core.drift,
+        };
+        self.is_akin(&other.obstacle.drifting(drift))
             && (self.touch.point - other.touch.point).norm() < 4e-3
             && (radius(self) - radius(other)).abs() < 0.5
     }
@@ -246,6 +251,8 @@ pub(super) fn step_cost(peaks: &[Peak]) -> usize {
     peaks.iter().map(of_one).sum::<usize>() / peaks.len().max(1)
 }
 
+/// A drifting peak is kept beside the one at rest if the log of its evidence is larger by so much.
+const WORTH_DRIFTING: f64 = 5.0;
 /// Most peaks kept from keyframe to keyframe.
 pub(super) const MOST: usize = 24;
 /// Of those whose log mass is so much below the best one's,
