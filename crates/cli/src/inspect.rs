@@ -90,6 +90,7 @@ fn links(robot: &Robot, report: &LoadReport) -> Table {
         "area m²",
         "open edges",
         "dropped",
+        "enclosed",
         "box m",
     ];
     let mut table = table::columns(&heads);
@@ -102,7 +103,7 @@ fn links(robot: &Robot, report: &LoadReport) -> Table {
 fn link_row(robot: &Robot, link: &Link, report: &LinkReport) -> Vec<String> {
     let mut row = vec![link.name.clone(), path(robot, link)];
     match &link.mesh {
-        None => row.resize(8, "–".to_owned()),
+        None => row.resize(9, "–".to_owned()),
         Some(mesh) => {
             let cleaning = &report.cleaning;
             let dropped = cleaning.degenerate_triangles
@@ -115,6 +116,7 @@ fn link_row(robot: &Robot, link: &Link, report: &LinkReport) -> Vec<String> {
                 format!("{:.4}", mesh.area()),
                 report.open_edges.to_string(),
                 dropped.to_string(),
+                report.enclosed_triangles.to_string(),
                 format!("{:.3} × {:.3} × {:.3}", size.x, size.y, size.z),
             ]);
         }

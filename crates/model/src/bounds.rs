@@ -1,5 +1,5 @@
 //! Boxes around triangles, in a tree of four below each: which triangles may be closer to a point than a distance that
-//! is known already.
+//! is known already, and which a ray may hit.
 //!
 //! Seen from a point far off, all of a surface is about equally near, and a search for the nearest place has to look
 //! nearly everywhere before it knows. Given the distance that a walk has found, few boxes reach into it.
@@ -27,12 +27,11 @@ pub(crate) struct Bounds {
 impl Bounds {
     /// Of triangles given by their corners, m.
     pub(crate) fn new(corners: &[[Point3<f64>; 3]]) -> Self {
-        let centre = |triangle: u32| {
-            let [a, b, c] = &corners[triangle as usize];
-            a.coords + b.coords + c.coords
-        };
+        let centres: Vec<_> = (corners.iter())
+            .map(|[a, b, c]| a.coords + b.coords + c.coords)
+            .collect();
         let mut triangles: Vec<u32> = (0..corners.len() as u32).collect();
-        sort(&mut triangles, &centre);
+        sort(&mut triangles, &centres);
         let box_of = |&triangle: &u32| {
             let corners = corners[triangle as usize].map(|corner| corner.coords.cast());
             let [a, b, c] = corners;
@@ -61,6 +60,44 @@ impl Bounds {
         self.descend(self.levels.len() - 1, 0, query, &mut squared, &mut look);
     }
 
+    /// All triangles, those close together soon after each other.
+    pub(crate) fn in_order(&self) -> &[u32] {
+        &self.triangles
+    }
+
+    /// A triangle for which `is_hit` holds, of those whose boxes a ray crosses: the first that is found, not the nearest.
+    pub(crate) fn any_along(
+        &self,
+        origin: &Point3<f64>,
+        direction: &Vector3<f64>,
+        mut is_hit: impl FnMut(u32) -> bool,
+    ) -> Option<u32> {
+        let ray = Ray::new(origin, direction);
+        self.any_below(self.levels.len() - 1, 0, &ray, &mut is_hit)
+    }
+
+    fn any_below(
+        &self,
+        level: usize,
+        group: usize,
+        ray: &Ray,
+        is_hit: &mut impl FnMut(u32) -> bool,
+    ) -> Option<u32> {
+        let mut crossed = self.levels[level][group].crossed(ray);
+        while crossed != 0 {
+            let below = group * FOUR + crossed.trailing_zeros() as usize;
+            crossed &= crossed - 1;
+            let found = match level {
+                0 => Some(self.triangles[below]).filter(|&triangle| is_hit(triangle)),
+                _ => self.any_below(level - 1, below, ray, is_hit),
+            };
+            if found.is_some() {
+                return found;
+            }
+        }
+        None
+    }
+
     fn descend(
         &self,
         level: usize,
@@ -83,15 +120,16 @@ impl Bounds {
 
 /// Sorts triangles so that those side by side are so in space as well: halves them along the longest side, where the
 /// first half fills whole boxes of every level.
-fn sort(triangles: &mut [u32], centre: &impl Fn(u32) -> Vector3<f64>) {
+fn sort(triangles: &mut [u32], centres: &[Vector3<f64>]) {
+    let centre = |triangle: u32| centres[triangle as usize];
     if triangles.len() <= 1 {
         return;
     }
-    let centres = triangles.iter().map(|&triangle| centre(triangle));
-    let low = centres
+    let places = triangles.iter().map(|&triangle| centre(triangle));
+    let low = places
         .clone()
         .fold(Vector3::repeat(f64::MAX), |a, b| a.inf(&b));
-    let high = centres.fold(Vector3::repeat(f64::MIN), |a, b| a.sup(&b));
+    let high = places.fold(Vector3::repeat(f64::MIN), |a, b| a.sup(&b));
     let axis = (high - low).imax();
     let half = triangles.len().next_power_of_two() / 2;
     triangles.select_nth_unstable_by(half, |&a, &b| {
@@ -99,8 +137,8 @@ fn sort(triangles: &mut [u32], centre: &impl Fn(u32) -> Vector3<f64>) {
         by_place.then(a.cmp(&b))
     });
     let (first, last) = triangles.split_at_mut(half);
-    sort(first, centre);
-    sort(last, centre);
+    sort(first, centres);
+    sort(last, centres);
 }
 
 type Corners = (Vector3<f32>, Vector3<f32>);
@@ -113,15 +151,15 @@ fn around(boxes: &[Corners]) -> Corners {
 impl Boxes {
     /// Of at most four; the others are nowhere.
     fn new(boxes: &[Corners]) -> Self {
-        let side = |pick: fn(&Corners) -> &Vector3<f32>| {
+        let side = |nowhere: f32, pick: fn(&Corners) -> &Vector3<f32>| {
             [0, 1, 2].map(|axis| {
-                let at = |lane: usize| boxes.get(lane).map_or(f32::INFINITY, |one| pick(one)[axis]);
+                let at = |lane: usize| boxes.get(lane).map_or(nowhere, |one| pick(one)[axis]);
                 f32x4::new([0, 1, 2, 3].map(at))
             })
         };
         Self {
-            low: side(|corners| &corners.0),
-            high: side(|corners| &corners.1),
+            low: side(f32::INFINITY, |corners| &corners.0),
+            high: side(f32::NEG_INFINITY, |corners| &corners.1),
         }
     }
 
@@ -136,6 +174,57 @@ impl Boxes {
             distance += outside * outside;
         }
         distance.simd_lt(f32x4::splat(squared)).to_bitmask()
+    }
+
+    /// Which of the boxes a ray crosses, by the distances at which it enters and leaves each pair of sides (Kay and
+    /// Kajiya, Ray Tracing Complex Scenes, 1986): a bit each.
+    #[inline]
+    fn crossed(&self, ray: &Ray) -> u32 {
+        let mut enters = f32x4::ZERO;
+        let mut leaves = f32x4::splat(f32::INFINITY);
+        for axis in 0..3 {
+            let inverse = ray.inverse[axis];
+            let low = (self.low[axis] - ray.below[axis]) * inverse;
+            let high = (self.high[axis] - ray.above[axis]) * inverse;
+            let (near, far) = match ray.forwards[axis] {
+                true => (low, high),
+                false => (high, low),
+            };
+            enters = enters.fast_max(near);
+            leaves = leaves.fast_min(far);
+        }
+        enters.simd_le(leaves).to_bitmask()
+    }
+}
+
+/// A ray as boxes see it.
+struct Ray {
+    /// The origin, moved by [`WIDER`] so that the lower sides of boxes lie that much lower, and the upper ones higher.
+    below: [f32x4; 3],
+    above: [f32x4; 3],
+    /// One over the direction's coordinates, and whether they are positive.
+    inverse: [f32x4; 3],
+    forwards: [bool; 3],
+}
+
+/// Boxes are taken for so much wider where rays cross them, m: more than single precision rounds on a link.
+const WIDER: f32 = 1e-6;
+
+impl Ray {
+    fn new(origin: &Point3<f64>, direction: &Vector3<f64>) -> Self {
+        let origin = origin.coords.cast::<f32>();
+        // Not zero, which would make no number of a side that the origin lies on.
+        let along = direction.map(|value| {
+            let value = value as f32;
+            if value.abs() < 1e-20 { 1e-20 } else { value }
+        });
+        let each = |of: &dyn Fn(usize) -> f32| [0, 1, 2].map(|axis| f32x4::splat(of(axis)));
+        Self {
+            below: each(&|axis| origin[axis] + WIDER),
+            above: each(&|axis| origin[axis] - WIDER),
+            inverse: each(&|axis| 1.0 / along[axis]),
+            forwards: [0, 1, 2].map(|axis| along[axis] > 0.0),
+        }
     }
 }
 
@@ -199,5 +288,40 @@ mod tests {
             least
         });
         assert!((1..200).contains(&visits), "{visits}");
+    }
+
+    #[test]
+    fn rays_see_all_that_they_may_hit_and_little_else() {
+        let cast = |count: u32| {
+            let corners = corners(count);
+            let bounds = Bounds::new(&corners);
+            move |origin: Point3<f64>, direction: Vector3<f64>| {
+                let mut seen = Vec::new();
+                bounds.any_along(&origin, &direction, |triangle| {
+                    seen.push(triangle);
+                    false
+                });
+                seen
+            }
+        };
+        for count in [1, 3, 4, 5, 17, 500] {
+            let (see, corners) = (cast(count), corners(count));
+            for (index, corners) in (0..).zip(&corners) {
+                for way in [
+                    Vector3::x(),
+                    -Vector3::y(),
+                    Vector3::z(),
+                    Vector3::new(0.0, 0.6, -0.8),
+                    Vector3::new(-0.36, 0.48, 0.8),
+                ] {
+                    // Straight at a corner, and so along sides of its box.
+                    let seen = see(corners[index as usize % 3] - way * 1.5, way);
+                    assert!(seen.contains(&index), "{index} of {count}, {way}");
+                    assert!(seen.len() < 3 + count as usize / 20, "{}", seen.len());
+                    let behind = see(corners[0] + way * 0.1, way);
+                    assert!(!behind.contains(&index), "{index} of {count}, {way}");
+                }
+            }
+        }
     }
 }

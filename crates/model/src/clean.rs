@@ -81,7 +81,8 @@ fn is_degenerate([a, b, c]: &[Point3<f64>; 3]) -> bool {
     doubled_area <= longest * LEAST_HEIGHT
 }
 
-fn without_unused_vertices(mesh: &TriangleMesh) -> TriangleMesh {
+/// The mesh with the vertices that its triangles use.
+pub(crate) fn without_unused_vertices(mesh: &TriangleMesh) -> TriangleMesh {
     let mut kept = TriangleMesh::default();
     let mut new_index = HashMap::new();
     for triangle in &mesh.triangles {

@@ -10,6 +10,7 @@ mod bounds;
 mod clean;
 mod dynamics;
 mod error;
+mod exposed;
 mod external_torque;
 mod iiwa14;
 mod inertial;

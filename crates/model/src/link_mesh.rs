@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::clean::clean;
+use crate::exposed::exposed;
 use crate::split::split;
 use crate::{Cleaning, LinkReport, LoadOptions, MeshSource, ModelError, TriangleMesh};
 use crate::{mesh_file, shape};
@@ -12,7 +13,7 @@ use crate::{mesh_file, shape};
 const NEARLY_CLOSED: f64 = 0.25;
 
 /// Builds a link's mesh in the link's frame: each element loaded, scaled, moved by its origin, cleaned and turned
-/// outwards; then all of them as one, split.
+/// outwards; then all of them as one, split, without what they enclose.
 pub(crate) fn build(
     link: &str,
     elements: &[(&urdf_rs::Pose, &urdf_rs::Geometry)],
@@ -40,9 +41,21 @@ pub(crate) fn build(
     report.inconsistent_edges = edges.inconsistent;
     report.split_edges = split(&mut mesh, options.max_edge)
         .map_err(|source| in_geometry(link, "its mesh".to_owned(), source))?;
+    let mesh = without_enclosed(mesh, &mut report);
     report.triangles = mesh.triangles.len();
     report.vertices = mesh.vertices.len();
     Ok((Some(mesh), report))
+}
+
+fn without_enclosed(mesh: TriangleMesh, report: &mut LinkReport) -> TriangleMesh {
+    let Some(exposed) = exposed(&mesh) else {
+        let warning =
+            "its triangles all enclose each other, as nothing else can be touched they are kept";
+        report.warnings.push(warning.to_owned());
+        return mesh;
+    };
+    report.enclosed_triangles = mesh.triangles.len() - exposed.triangles.len();
+    exposed
 }
 
 /// One element's mesh in the link's frame, cleaned and turned outwards.

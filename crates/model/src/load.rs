@@ -79,6 +79,8 @@ pub struct LinkReport {
     pub inconsistent_edges: usize,
     /// Edges halved because they were too long.
     pub split_edges: usize,
+    /// Triangles dropped after splitting because other ones enclose them: nothing can touch them.
+    pub enclosed_triangles: usize,
     /// What a person should look at, in sentences.
     pub warnings: Vec<String>,
 }

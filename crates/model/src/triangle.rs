@@ -111,6 +111,21 @@ impl Triangle {
         }
         (p - *self.normal * self.normal.dot(&ap), Feature::Face)
     }
+
+    /// Whether a ray hits the triangle, from whichever side (Möller and Trumbore, Fast, Minimum Storage Ray/Triangle
+    /// Intersection, 1997; its letters). So does one that passes an edge by a rounding error, lest any slip through
+    /// between two triangles.
+    #[inline]
+    pub(crate) fn is_hit(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> bool {
+        const MARGIN: f64 = 1e-9;
+        let p = direction.cross(&self.edge_2);
+        let inverse = 1.0 / self.edge_1.dot(&p);
+        let t = origin - self.corner;
+        let u = t.dot(&p) * inverse;
+        let q = t.cross(&self.edge_1);
+        let v = direction.dot(&q) * inverse;
+        u >= -MARGIN && v >= -MARGIN && u + v <= 1.0 + MARGIN && self.edge_2.dot(&q) * inverse > 0.0
+    }
 }
 
 #[cfg(test)]
@@ -172,6 +187,24 @@ mod tests {
                 let expected = inwards.dot(&(query - from));
                 assert!((depths[edge] / units[edge] - expected).abs() < 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn rays_hit_what_they_point_at() {
+        let triangle = triangle();
+        for query in queries().filter(|query| triangle.height(query).abs() > 1e-3) {
+            for (along_1, along_2) in [-0.2, 0.0, 0.3, 0.5, 0.7, 1.0, 1.2]
+                .into_iter()
+                .flat_map(|one| [-0.1, 0.0, 0.3, 0.5, 1.1].map(|two| (one, two)))
+            {
+                let is_on_it = along_1 >= 0.0 && along_2 >= 0.0 && along_1 + along_2 <= 1.0;
+                let way = (triangle.at(along_1, along_2) - query).normalize();
+                assert_eq!(triangle.is_hit(&query, &way), is_on_it, "{query} {way}");
+                assert!(!triangle.is_hit(&query, &-way));
+            }
+            let along_the_plane = triangle.edge_1.normalize();
+            assert!(!triangle.is_hit(&query, &along_the_plane));
         }
     }
 }

@@ -6,7 +6,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Point3, Vector3};
 use palpate_model::{
-    EmbeddedMeshes, Geometry, JointKind, LoadOptions, LoadReport, ModelError, Robot,
+    EmbeddedMeshes, Geometry, JointKind, LoadOptions, LoadReport, MeshSource, ModelError, Robot,
 };
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -177,6 +177,64 @@ fn meshes_are_scaled_before_they_are_moved_and_turned_outwards() {
     assert!(report.split_edges > 0);
     assert!(
         report.warnings[0].contains("inside_out.obj"),
+        "{:?}",
+        report.warnings
+    );
+}
+
+/// A flange as it is drawn: behind its face, on the same line of action, lies the disc of a motor.
+#[test]
+fn a_disc_behind_a_face_cannot_be_touched() {
+    let flange =
+        r#"<collision><geometry><cylinder radius="0.05" length="0.1"/></geometry></collision>"#;
+    let disc = r#"<collision><origin xyz="0 0 0.01"/><geometry><cylinder radius="0.03" length="0.002"/></geometry>
+        </collision>"#;
+    let (alone, _) = load(&lone(flange)).unwrap();
+    let (robot, report) = load(&lone(&format!("{flange}{disc}"))).unwrap();
+    let corners = |robot: &Robot| {
+        let mesh = robot.links[0].mesh.as_ref().unwrap();
+        let triangles = 0..mesh.triangles.len();
+        triangles
+            .map(|index| mesh.corners(index))
+            .collect::<Vec<_>>()
+    };
+    assert!(corners(&robot) == corners(&alone));
+    let report = &report.links[0];
+    assert_eq!(report.elements, 2);
+    assert!(report.enclosed_triangles > 32, "{report:?}");
+    assert!(report.warnings.is_empty());
+}
+
+struct Book(String);
+
+impl MeshSource for Book {
+    fn read(&self, _: &str) -> Result<Vec<u8>, ModelError> {
+        Ok(self.0.clone().into_bytes())
+    }
+}
+
+/// Sheets around an axis like the pages of an open book, so many that no ray finds its way out between them.
+#[test]
+fn a_link_whose_triangles_all_enclose_each_other_keeps_them() {
+    let pages = 720;
+    let mut book = String::from("v 0 0 -5\nv 0 0 5\n");
+    for page in 0..pages {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(page) / f64::from(pages)).sin_cos();
+        let (low, high) = (2 * page + 3, 2 * page + 4);
+        book += &format!("v {cos} {sin} -5\nv {cos} {sin} 5\nf 1 {low} {high}\nf 1 {high} 2\n");
+    }
+    let options = LoadOptions {
+        max_edge: f64::INFINITY,
+        ..LoadOptions::default()
+    };
+    let xml = collision(r#"<mesh filename="book.obj"/>"#);
+    let (robot, report) = Robot::from_urdf(&xml, &Book(book), &options).unwrap();
+    let mesh = robot.links[0].mesh.as_ref().unwrap();
+    assert_eq!(mesh.triangles.len(), 2 * pages as usize);
+    let report = &report.links[0];
+    assert_eq!(report.enclosed_triangles, 0);
+    assert!(
+        report.warnings[0].contains("enclose"),
         "{:?}",
         report.warnings
     );
