@@ -1,7 +1,7 @@
 //! The estimator of this project: the paper's curvature model with memory.
 //!
-//! A particle is an obstacle that rests in the world or drifts ([`obstacle`]); its weight is the evidence of the contact's whole
-//! history ([`memory`], [`evidence`]), with force, stiffness, friction and bias solved and the noise learned
+//! A particle is an obstacle that rests in the world or drifts ([`obstacle`]); its weight is the evidence of the contact's
+//! whole history ([`memory`], [`evidence`]), with force, stiffness, friction and bias solved and the noise learned
 //! ([`noise`]). Peaks of the evidence are found by asking every triangle ([`scan`]) and climbing ([`search`]); Markov
 //! chain moves ([`moves`]) carry the particles between and around them, so that a wrong mode is left again. The work
 //! that a keyframe causes is spread over the samples until the next ([`agenda`]).
@@ -158,8 +158,8 @@ impl PalpateFilter {
             self.noise.begin();
             self.forget_places();
             self.keyframes = 1;
+            self.noise.sum(&self.memory.keyframes);
         }
-        self.noise.sum(&self.memory.keyframes);
         self.agenda.enter(match self.misfits {
             0 => Phase::Calibrate,
             _ => self.weighing(),
