@@ -1,6 +1,7 @@
 //! `palpate evaluate detection`: how surely and how soon pushes are noticed, and how often something else is.
 
 mod begins;
+mod bound;
 mod free;
 mod plot;
 mod pushes;
@@ -53,7 +54,7 @@ pub fn run(evaluate: &Evaluate) -> Result<()> {
         links: evaluate.link_numbers(&robot)?,
     };
     let mut report = Report::new(evaluate.out.clone())?;
-    let work = free::count(&plan) + pushes::count(&plan) + roc::count(&plan);
+    let work = free::count(&plan) + pushes::count(&plan) + bound::count(&plan) + roc::count(&plan);
     let bar = progress::bar(work, "evaluate", evaluate.quiet);
     let add = |report: &mut Report, text: String| -> Result<()> {
         bar.suspend(|| terminal::print(&text))?;
@@ -65,6 +66,7 @@ pub fn run(evaluate: &Evaluate) -> Result<()> {
     report.file("free.csv", &csv)?;
     let pushed = pushes::run(&plan, &bar)?;
     add(&mut report, pushed.table(&plan))?;
+    add(&mut report, bound::run(&plan, &pushed, &bar)?)?;
     report.file("pushes.csv", &pushed.csv())?;
     report.plot("detection", &plot::of_pushes(&plan, &pushed))?;
     let curves = roc::run(&plan, &bar)?;

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use indicatif::ProgressBar;
 use palpate_filter::DetectorParameters;
-use palpate_sim::Push;
+use palpate_sim::{DriveScenario, Push};
 
 use super::situation::{SITUATIONS, Situation, Source};
 use super::watch::{Lane, Watched, watch};
@@ -100,31 +100,14 @@ fn run_one(
     force: f64,
     link: usize,
 ) -> Result<Vec<Cell>> {
-    let robot = plan.robot;
-    let is_it = |other: &&palpate_model::Link| other.path.len() == link && other.mesh.is_some();
-    let Some(name) = robot.links.iter().find(is_it).map(|link| &link.name) else {
+    let Some(scenario) = push_scenario(plan, rate_hz, situation, force, link) else {
         return Ok(Vec::new());
     };
-    // The same spots and times for every force, rate and situation.
-    let seed = mixed(&[plan.seed, 100 + link as u64]);
-    let pushes: Vec<_> = (0..plan.pushes)
-        .map(|number| {
-            let jitter = 0.1 * share(&[seed, number as u64]);
-            Push::new(
-                name,
-                force,
-                FIRST_SECS + EVERY_SECS * number as f64 + jitter,
-            )
-        })
-        .collect();
-    let secs = FIRST_SECS + EVERY_SECS * pushes.len() as f64;
-    let mut scenario = situation.scenario(robot, seed, rate_hz, secs);
-    scenario.pushes = pushes;
     let lanes = Source::ALL.map(|source| Lane {
         source,
         detector: DetectorParameters::default(),
     });
-    let watched = watch(robot, situation, &scenario, &lanes)?;
+    let watched = watch(plan.robot, situation, &scenario, &lanes)?;
     let cell = |(source, watched): (Source, Watched)| {
         let found: Vec<_> = (scenario.pushes.iter())
             .filter_map(|push| noticed(&watched, push))
@@ -143,6 +126,40 @@ fn run_one(
         }
     };
     Ok(Source::ALL.into_iter().zip(watched).map(cell).collect())
+}
+
+/// A motion in which a link is pushed again and again; none if the robot has no such link.
+pub fn push_scenario(
+    plan: &Plan,
+    rate_hz: f64,
+    situation: &Situation,
+    force: f64,
+    link: usize,
+) -> Option<DriveScenario> {
+    let robot = plan.robot;
+    let is_it = |other: &&palpate_model::Link| other.path.len() == link && other.mesh.is_some();
+    let name = robot.links.iter().find(is_it).map(|link| &link.name)?;
+    // The same spots and times for every force, rate and situation.
+    let seed = mixed(&[plan.seed, 100 + link as u64]);
+    let pushes: Vec<_> = (0..plan.pushes)
+        .map(|number| {
+            let jitter = 0.1 * share(&[seed, number as u64]);
+            Push::new(
+                name,
+                force,
+                FIRST_SECS + EVERY_SECS * number as f64 + jitter,
+            )
+        })
+        .collect();
+    let secs = FIRST_SECS + EVERY_SECS * pushes.len() as f64;
+    let mut scenario = situation.scenario(robot, seed, rate_hz, secs);
+    scenario.pushes = pushes;
+    Some(scenario)
+}
+
+/// Time within which a push is to be noticed, s.
+pub fn limit_secs(rate_hz: f64) -> f64 {
+    if rate_hz > 500.0 { 0.02 } else { 0.1 }
 }
 
 /// Delay with which a push was noticed while it lasted, s, and the number of the first link that was told.
@@ -196,6 +213,31 @@ impl Pushed {
         text
     }
 
+    /// Share of the pushes of a cell that were noticed in time.
+    pub fn in_time(
+        &self,
+        situation: &Situation,
+        source: Source,
+        rate_hz: f64,
+        force: f64,
+        link: usize,
+    ) -> f64 {
+        let wanted = (situation.name, source, rate_hz, force, link);
+        let mut cells = self.cells.iter();
+        let cell = cells.find(|cell| {
+            (
+                cell.situation,
+                cell.source,
+                cell.rate_hz,
+                cell.force,
+                cell.link,
+            ) == wanted
+        });
+        cell.map_or(0.0, |cell| {
+            cell.within(limit_secs(rate_hz)) as f64 / cell.pushes.max(1) as f64
+        })
+    }
+
     /// A row for each cell.
     pub fn csv(&self) -> String {
         let mut csv = String::from(
@@ -220,7 +262,7 @@ impl Pushed {
 }
 
 fn told(cell: &Cell) -> String {
-    let limit = if cell.rate_hz > 500.0 { 0.02 } else { 0.1 };
+    let limit = limit_secs(cell.rate_hz);
     let percent = |count: usize| 100.0 * count as f64 / cell.pushes.max(1) as f64;
     let (found, soon) = (percent(cell.delays.len()), percent(cell.within(limit)));
     match cell.delays.is_empty() {
