@@ -218,6 +218,33 @@ fn the_noise_of_each_joint_is_its_own() {
 }
 
 #[test]
+fn the_joints_beyond_tell_what_of_a_joints_torque_is_noise() {
+    // Two joints share a noise in which the push on the first would drown for long.
+    let mut stream = Stream::new(1000.0);
+    let noisy = |push: f64| {
+        move |_: f64, normal: &mut dyn FnMut() -> f64| {
+            let shared = 0.3 * normal();
+            let mut own = || 0.03 * normal();
+            [
+                push + shared + own(),
+                0.0,
+                0.0,
+                shared + own(),
+                0.0,
+                0.0,
+                0.0,
+            ]
+        }
+    };
+    stream.feed(20.0, noisy(0.0));
+    assert_eq!(stream.events, []);
+    stream.feed(0.02, noisy(0.3));
+    assert!(stream.detector.detection().joints[0]);
+    let first = stream.detector.detection().first_link;
+    assert_eq!(first, robot().link_index("lbr_link_1"));
+}
+
+#[test]
 fn a_gap_and_a_jump_back_in_time_begin_anew_with_the_bias_known() {
     let mut stream = Stream::new(100.0);
     stream.feed_noisy(10.0, [0.12; 7]);

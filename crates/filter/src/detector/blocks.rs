@@ -1,9 +1,8 @@
 //! The last fraction of a second: what it would teach is held back until no contact followed, and taken back otherwise.
 
 use super::bias::BiasFilter;
-use super::joint::JointDetector;
+use super::joint::{JointDetector, Seen};
 use super::motion::Motion;
-use super::noise::Span;
 
 /// Length of a block, s, and how many are held back.
 const BLOCK_SECS: f64 = 0.05;
@@ -14,7 +13,7 @@ const HELD: usize = 8;
 struct Part {
     /// The bias when it began.
     bias: BiasFilter,
-    span: Span,
+    seen: Seen,
 }
 
 /// The blocks held back, from the oldest on.
@@ -63,7 +62,7 @@ impl Blocks {
         let x2 = motion.quickness().powi(2);
         for ((parts, joint), turning) in self.parts.iter_mut().zip(joints).zip(motion.turning()) {
             if let Some(part) = &mut parts[newest] {
-                (part.span).add(step_secs, x2, *turning, joint.smoothed);
+                joint.see(&mut part.seen, step_secs, x2, *turning);
             }
         }
     }
@@ -72,7 +71,7 @@ impl Blocks {
         if self.count == HELD {
             for (parts, joint) in self.parts.iter().zip(&mut *joints) {
                 if let Some(part) = &parts[self.oldest] {
-                    joint.learn_noise(&part.span, motion_std);
+                    joint.learn_noise(&part.seen, motion_std);
                 }
             }
             self.oldest = (self.oldest + 1) % HELD;
@@ -85,7 +84,7 @@ impl Blocks {
         for (parts, joint) in self.parts.iter_mut().zip(joints) {
             parts[place] = Some(Part {
                 bias: joint.bias,
-                span: Span::default(),
+                seen: Seen::default(),
             });
         }
     }

@@ -2,6 +2,8 @@
 
 use super::bias::{BiasFilter, Forgetting};
 use super::noise::{Exposure, Span, Spread, White};
+use super::onset::{ONSETS, Partial};
+use super::turns::{TurnSpan, Turns};
 use super::{DetectorParameters, JointBias};
 
 /// Time constants of the charts, s.
@@ -10,9 +12,12 @@ pub(super) const SCALES: [f64; CHARTS] = [0.004, 0.02, 0.08];
 /// The chart that says whether a contact ended.
 const RELEASE: usize = 1;
 /// A sample counts for at most so many standard deviations: one wrong sample is no contact.
-const CLIP: f64 = 8.0;
+const CLIP: f64 = 6.0;
 /// Below so many standard deviations of the chart there is no sign of a contact.
 const CALM: f64 = 2.0;
+
+/// A joint that turns by less does not explain what its charts read, 0 to 1.
+pub(super) const DOUBTFUL_TURN: f64 = 0.3;
 
 /// What the charts of all joints share: gains of this step, and the share of white noise's variance that each keeps.
 #[derive(Clone, Copy, Debug, Default)]
@@ -37,24 +42,52 @@ impl Charts {
     }
 }
 
+/// How much a joint turns back, 0 to 1.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Turning {
+    /// As far as slow charts see, long before and after.
+    pub(super) wide: f64,
+    /// While its speed is about zero.
+    pub(super) narrow: f64,
+}
+
+/// Some time without contact, as seen by the charts of one joint.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Seen {
+    smoothed: Span,
+    onset: TurnSpan,
+}
+
 /// The charts, the noise and the bias of one joint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointDetector {
     pub(super) bias: BiasFilter,
     white: White,
-    pub(super) spread: [Spread; CHARTS],
-    pub(super) exposure: Exposure,
+    spread: [Spread; CHARTS],
+    exposure: Exposure,
     /// What was seen during the present contact.
-    doubt: Span,
+    doubt: Seen,
     /// What each chart reads where a contact begins, Nm.
     limit: [f64; CHARTS],
-    pub(super) smoothed: [f64; CHARTS],
+    smoothed: [f64; CHARTS],
+    /// By how much each was beyond its threshold with the last sample, in thresholds.
+    last_ratio: [f64; CHARTS],
+    /// The same for the charts of sudden changes.
+    turns: Turns,
+    onset_limit: [f64; ONSETS],
+    partial: Partial,
+    /// By how much each chart of sudden changes was beyond its threshold with the last sample, in thresholds.
+    onset_ratio: [f64; ONSETS],
     /// Standard deviation of a sample's residual, Nm.
     sample_std: f64,
     residual: f64,
-    /// The chart that is furthest beyond its threshold, in thresholds.
+    /// The chart that was furthest beyond its threshold with both of the last two samples, in thresholds; and the same with
+    /// the last alone.
     pub(super) ratio: f64,
-    /// The same for the chart that ends contacts.
+    pub(super) newest_ratio: f64,
+    /// Whether a chart is beyond its threshold while nothing turns that it sees.
+    pub(super) is_off_turns: bool,
+    /// The same ratio for the chart that ends contacts.
     pub(super) release_ratio: f64,
     least_torque: f64,
     release_std: f64,
@@ -71,11 +104,18 @@ impl JointDetector {
             white,
             spread: [Spread::new(parameters.motion_std); CHARTS],
             exposure: Exposure::default(),
-            doubt: Span::default(),
+            doubt: Seen::default(),
             limit: [0.0; CHARTS],
             smoothed: [0.0; CHARTS],
+            last_ratio: [0.0; CHARTS],
+            turns: Turns::new(),
+            onset_limit: [f64::INFINITY; ONSETS],
+            partial: Partial::default(),
+            onset_ratio: [0.0; ONSETS],
             residual: 0.0,
             ratio: 0.0,
+            newest_ratio: 0.0,
+            is_off_turns: false,
             release_ratio: 0.0,
             least_torque: parameters.least_torque,
             release_std: 0.0,
@@ -94,6 +134,16 @@ impl JointDetector {
         self.stirred_ns = None;
     }
 
+    /// The last sample's torque, as far as it is believed, Nm.
+    pub(super) fn torque(&self) -> f64 {
+        self.bias.mean + self.residual
+    }
+
+    /// What turning back adds to the variance of a sudden change, Nm².
+    pub(super) fn jump(&self, chart: usize, turning: Turning, variance: f64) -> f64 {
+        self.turns.at(chart, turning.narrow, variance)
+    }
+
     /// Puts a sample's torque, Nm, on the charts.
     pub(super) fn look(&mut self, torque: f64, step_secs: f64, charts: &Charts) {
         self.white.learn(torque, step_secs);
@@ -104,13 +154,32 @@ impl JointDetector {
         }
     }
 
-    /// Weighs the charts against their thresholds, while the joint turns by `turning`.
-    pub(super) fn weigh(&mut self, stamp_ns: i64, turning: f64, charts: &Charts, scene: &Weighing) {
+    /// Weighs the charts against their thresholds.
+    pub(super) fn weigh(
+        &mut self,
+        stamp_ns: i64,
+        turning: Turning,
+        charts: &Charts,
+        partial: &Partial,
+        scene: &Weighing,
+    ) {
+        self.ratio = 0.0;
+        self.newest_ratio = 0.0;
+        self.is_off_turns = false;
+        let stirs = self.weigh_smoothed(turning.wide, charts, scene);
+        let jolts = self.weigh_onset(turning.wide, partial, scene);
+        self.stirred_ns = match stirs || jolts {
+            true => self.stirred_ns.or(Some(stamp_ns)),
+            false => None,
+        };
+    }
+
+    /// Tells whether there is a sign of a contact.
+    fn weigh_smoothed(&mut self, turning: f64, charts: &Charts, scene: &Weighing) -> bool {
         let bias = self.bias.variance + scene.frozen_variance;
         let white = self.white.variance();
         let noise = white.max(self.spread[0].at(scene.x2, turning));
         self.sample_std = (noise + bias).sqrt();
-        self.ratio = 0.0;
         for scale in 0..CHARTS {
             let noise = (white * charts.share[scale]).max(self.spread[scale].at(scene.x2, turning));
             let std = (noise + bias).sqrt();
@@ -118,16 +187,39 @@ impl JointDetector {
             let limit = (scene.threshold * std).max(self.least_torque);
             let ratio = smoothed / limit;
             self.limit[scale] = limit;
-            self.ratio = self.ratio.max(ratio);
+            let last = std::mem::replace(&mut self.last_ratio[scale], ratio);
+            self.compare(last, ratio, turning);
             if scale == RELEASE {
                 self.release_ratio = ratio;
                 self.release_std = std;
-                self.stirred_ns = match smoothed < CALM * std {
-                    true => None,
-                    false => self.stirred_ns.or(Some(stamp_ns)),
-                };
             }
         }
+        self.smoothed[RELEASE].abs() >= CALM * self.release_std
+    }
+
+    /// The same for sudden changes.
+    fn weigh_onset(&mut self, turning: f64, partial: &Partial, scene: &Weighing) -> bool {
+        let mut stirs = false;
+        self.partial = *partial;
+        for chart in 0..ONSETS {
+            let std = partial.variance[chart].sqrt();
+            let size = partial.residual[chart].abs();
+            let limit = (scene.threshold * std).max(self.least_torque);
+            self.onset_limit[chart] = limit;
+            let last = std::mem::replace(&mut self.onset_ratio[chart], size / limit);
+            self.compare(last, size / limit, turning);
+            stirs |= size > CALM * std;
+        }
+        stirs
+    }
+
+    /// Takes what a chart read with the last sample but one and with the last in, in thresholds. One wrong sample is no
+    /// contact, but nothing to learn from either.
+    fn compare(&mut self, last: f64, newest: f64, turning: f64) {
+        let ratio = last.min(newest);
+        self.newest_ratio = self.newest_ratio.max(newest);
+        self.ratio = self.ratio.max(ratio);
+        self.is_off_turns |= ratio >= 1.0 && turning < DOUBTFUL_TURN;
     }
 
     /// Learns the bias from the last sample; `trust` is the share of the full gain. A turn teaches nothing until it is over.
@@ -137,25 +229,37 @@ impl JointDetector {
         self.bias.learn(self.residual, white, trust, forgetting);
     }
 
+    /// Adds the last sample to what was seen.
+    pub(super) fn see(&self, seen: &mut Seen, step_secs: f64, x2: f64, turning: Turning) {
+        (seen.smoothed).add(step_secs, x2, turning.wide, self.smoothed);
+        (seen.onset).add(step_secs, turning.narrow, self.partial.rise);
+    }
+
+    /// Learns the noise from what was seen without contact.
+    pub(super) fn learn_noise(&mut self, seen: &Seen, motion_std: f64) {
+        (seen.smoothed).teach(&mut self.exposure, &mut self.spread, motion_std, false);
+        self.turns.learn(&seen.onset);
+    }
+
     /// Notes what a contact looks like, for it may turn out to be none. No more counts than what begins a contact.
-    pub(super) fn doubt(&mut self, step_secs: f64, x2: f64, turning: f64) {
-        let charts = std::array::from_fn(|scale| self.smoothed[scale].abs().min(self.limit[scale]));
-        self.doubt.add(step_secs, x2, turning, charts);
+    pub(super) fn doubt(&mut self, step_secs: f64, x2: f64, turning: Turning) {
+        let smoothed = at_most(self.smoothed, self.limit);
+        let partial = at_most(self.partial.rise, self.onset_limit);
+        (self.doubt.smoothed).add(step_secs, x2, turning.wide, smoothed);
+        (self.doubt.onset).add(step_secs, turning.narrow, partial);
     }
 
-    /// Learns from what was noted and forgets it; not if it was a contact without doubt, or `off_turns` and the noise is
-    /// known.
-    pub(super) fn settle(&mut self, is_doubtful: bool, off_turns: bool, motion_std: f64) {
-        let span = std::mem::take(&mut self.doubt);
+    /// Learns from what was noted and forgets it; not if it was a contact without doubt, nor, of the slow charts, `off_turns`
+    /// once the noise is known. Jumps stand out, so that of them any short contact teaches, a little each.
+    pub(super) fn settle(&mut self, ended: Ended, motion_std: f64) {
+        let doubt = std::mem::take(&mut self.doubt);
         let is_known = self.exposure.is_long();
-        if is_doubtful && !(is_known && off_turns) {
-            span.teach(&mut self.exposure, &mut self.spread, motion_std, is_known);
+        if ended.is_doubtful && !(is_known && ended.off_turns) {
+            (doubt.smoothed).teach(&mut self.exposure, &mut self.spread, motion_std, is_known);
         }
-    }
-
-    /// Learns the noise from a span without contact.
-    pub(super) fn learn_noise(&mut self, span: &Span, motion_std: f64) {
-        span.teach(&mut self.exposure, &mut self.spread, motion_std, false);
+        if ended.was_turn {
+            self.turns.learn(&doubt.onset);
+        }
     }
 
     /// Sets the bias, as after a tare.
@@ -188,6 +292,21 @@ impl JointDetector {
         let room = (self.least_torque - self.smoothed[RELEASE].abs()) / self.release_std;
         0.5 * libm::erfc(-room / std::f64::consts::SQRT_2)
     }
+}
+
+fn at_most<const N: usize>(readings: [f64; N], limits: [f64; N]) -> [f64; N] {
+    std::array::from_fn(|chart| readings[chart].abs().min(limits[chart]))
+}
+
+/// A contact that ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ended {
+    /// Whether it was short and hardly stood out.
+    pub(super) is_doubtful: bool,
+    /// Whether it was short and began where nothing but turning joints felt it.
+    pub(super) was_turn: bool,
+    /// Whether a joint felt it that did not turn.
+    pub(super) off_turns: bool,
 }
 
 /// What a sample is weighed with, the same for all joints.

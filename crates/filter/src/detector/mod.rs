@@ -5,17 +5,23 @@
 //! most at the stated rate ([`alarm`]) is a contact. The standard deviation is learned while nothing touches ([`noise`]):
 //! white noise from second differences, what does not average out from the smoothed residuals themselves, so that noise
 //! may be correlated or quantised, and what grows with motion or comes where a joint turns back ([`motion`]), as friction
-//! does. The bias is a slow random walk ([`bias`]), faster in motion. What was learned shortly before a contact is taken
+//! does ([`turns`]). Beside these are charts of sudden changes, of what the joints beyond do not explain of a joint's torque
+//! ([`onset`]): they notice pushes soonest, in fast motion too. The bias is a slow random walk ([`bias`]), faster in motion.
+//! What was learned shortly before a contact is taken
 //! back ([`blocks`]), and nothing is learned during one.
 
 mod alarm;
 mod bias;
 mod blocks;
+mod cells;
+mod covariance;
 mod joint;
 mod motion;
 mod noise;
+mod onset;
 mod parameters;
 mod reach;
+mod turns;
 
 use palpate_model::{JointSample, Robot};
 
@@ -24,18 +30,18 @@ use crate::{Admitted, ContactChange, ContactEvent, Detection, ParameterError};
 use bias::Forgetting;
 pub use bias::JointBias;
 use blocks::Blocks;
-use joint::{Charts, JointDetector, Weighing};
+use joint::{Charts, Ended, JointDetector, Weighing};
 use motion::Motion;
+use onset::Onset;
 pub use parameters::DetectorParameters;
 use reach::Reach;
 
 /// After so long without sample the smoothed residuals begin anew, s.
 const GAP_SECS: f64 = 0.5;
 /// A short contact that hardly stood out may have been none, and teaches: noise while little is known of it, else what
-/// happened on joints that turned back, if no other one felt it. In s, thresholds, and how much a joint turned.
+/// happened on joints that turned back, if no other one felt it. In s and in thresholds.
 const DOUBTFUL_SECS: f64 = 3.0;
 const DOUBTFUL_RATIO: f64 = 1.5;
-const DOUBTFUL_TURN: f64 = 0.3;
 /// Time over which the time between samples is learned, in samples.
 const PERIOD_SAMPLES: f64 = 50.0;
 /// A contact within this time of the stream's begin was not seen to begin, s.
@@ -48,6 +54,7 @@ pub struct Detector {
     parameters: DetectorParameters,
     joints: Vec<JointDetector>,
     charts: Charts,
+    onset: Onset,
     motion: Motion,
     blocks: Blocks,
     /// First stamp of the stream, and of what came after the last time that a contact was forgotten.
@@ -58,6 +65,8 @@ pub struct Detector {
     /// Whether the present contact stands out well, and whether a joint feels it that does not turn.
     stands_out: bool,
     is_off_turns: bool,
+    /// The joint that alone feels it, if that turned when it began to.
+    turned: Option<usize>,
     quiet_secs: f64,
     /// Where the robot was when the present contact began.
     contact_position: Vec<f64>,
@@ -78,6 +87,7 @@ impl Detector {
         Ok(Self {
             joints: vec![joint; dof],
             charts: Charts::default(),
+            onset: Onset::new(dof),
             motion: Motion::new(dof),
             blocks: Blocks::new(dof),
             begin_ns: None,
@@ -86,6 +96,7 @@ impl Detector {
             weighing: Weighing::default(),
             stands_out: false,
             is_off_turns: false,
+            turned: None,
             quiet_secs: 0.0,
             contact_position: vec![0.0; dof],
             reach: Reach::new(robot),
@@ -153,12 +164,18 @@ impl Detector {
         let step_secs = self.advance(stamp_ns, position);
         self.weighing = self.weighing_at(stamp_ns, position);
         let weighing = self.weighing;
-        let turning = self.motion.turning();
-        for ((joint, &torque), &turning) in
-            (self.joints.iter_mut().zip(external_torque)).zip(turning)
-        {
+        for (joint, &torque) in self.joints.iter_mut().zip(external_torque) {
             joint.look(torque, step_secs, &self.charts);
-            joint.weigh(stamp_ns, turning, &self.charts, &weighing);
+        }
+        let torques = self.joints.iter().map(JointDetector::torque);
+        let (joints, turning) = (&self.joints, self.motion.turning());
+        let jump = |joint: usize, chart: usize, variance| {
+            joints[joint].jump(chart, turning[joint], variance)
+        };
+        self.onset.look(torques, step_secs, jump);
+        let found = self.motion.turning().iter().zip(self.onset.partials());
+        for (joint, (&turning, partial)) in self.joints.iter_mut().zip(found) {
+            joint.weigh(stamp_ns, turning, &self.charts, partial, &weighing);
         }
         self.detection.event = None;
         match self.detection.in_contact {
@@ -178,6 +195,7 @@ impl Detector {
         self.begin_ns.get_or_insert(stamp_ns);
         if !goes_on {
             self.charts.begin();
+            self.onset.begin();
             self.motion.begin(position);
             self.blocks.clear();
             self.joints.iter_mut().for_each(JointDetector::begin);
@@ -196,7 +214,8 @@ impl Detector {
     }
 
     fn weighing_at(&self, stamp_ns: i64, position: &[f64]) -> Weighing {
-        let looks = 3600.0 / self.period_secs * (self.joints.len() * joint::CHARTS) as f64;
+        let looks = 3600.0 / self.period_secs
+            * (self.joints.len() * (joint::CHARTS + onset::ONSETS)) as f64;
         let frozen_variance = self.detection.since_ns.map_or(0.0, |since_ns| {
             let secs = secs_between(since_ns, stamp_ns).max(0.0);
             bias::frozen_variance(distance(position, &self.contact_position), secs)
@@ -214,9 +233,10 @@ impl Detector {
     }
 
     fn watch_for_start(&mut self, stamp_ns: i64, position: &[f64], step_secs: f64) {
-        let ratio = self.ratio();
-        if ratio < 1.0 {
-            return self.learn(stamp_ns, step_secs, ratio);
+        let newest = self.joints.iter().map(|joint| joint.newest_ratio);
+        let newest = newest.fold(0.0, f64::max);
+        if newest < 1.0 {
+            return self.learn(stamp_ns, step_secs, newest);
         }
         let loud = (self.joints.iter()).filter(|joint| joint.ratio >= 1.0);
         let strongest = loud.max_by(|a, b| a.ratio.total_cmp(&b.ratio));
@@ -238,8 +258,9 @@ impl Detector {
         let (motion, motion_std) = (&self.motion, self.parameters.motion_std);
         (self.blocks).take(stamp_ns, step_secs, motion, &mut self.joints, motion_std);
         for (joint, turning) in self.joints.iter_mut().zip(motion.turning()) {
-            joint.learn_bias(trust, *turning, forgetting);
+            joint.learn_bias(trust, turning.wide, forgetting);
         }
+        self.onset.learn(trust);
     }
 
     fn start(&mut self, stamp_ns: i64, since_ns: i64, position: &[f64]) {
@@ -248,6 +269,7 @@ impl Detector {
         self.quiet_secs = 0.0;
         self.stands_out = false;
         self.is_off_turns = false;
+        self.turned = self.turned_alone();
         self.detection.in_contact = true;
         self.detection.since_ns = Some(since_ns);
         self.detection.first_link = None;
@@ -259,12 +281,27 @@ impl Detector {
         });
     }
 
+    /// The joint that alone feels something, while it turns.
+    fn turned_alone(&self) -> Option<usize> {
+        let mut loud = (0..self.joints.len()).filter(|&joint| self.joints[joint].ratio >= 1.0);
+        let (first, other) = (loud.next(), loud.next());
+        let turns = |joint: &usize| self.motion.turning()[*joint].narrow >= joint::DOUBTFUL_TURN;
+        first.filter(turns).filter(|_| other.is_none())
+    }
+
     fn watch_for_end(&mut self, stamp_ns: i64, step_secs: f64) {
         let x2 = self.weighing.x2;
         for (joint, turning) in self.joints.iter_mut().zip(self.motion.turning()) {
             joint.doubt(step_secs, x2, *turning);
             self.stands_out |= joint.ratio >= DOUBTFUL_RATIO;
-            self.is_off_turns |= joint.ratio >= 1.0 && *turning < DOUBTFUL_TURN;
+            self.is_off_turns |= joint.is_off_turns;
+        }
+        let felt_beside = |turned: usize| {
+            let mut joints = self.joints.iter().enumerate();
+            joints.any(|(joint, other)| joint != turned && other.ratio >= 1.0)
+        };
+        if self.turned.is_some_and(felt_beside) {
+            self.turned = None;
         }
         let share = self.parameters.release_share;
         let is_quiet = self.joints.iter().all(|joint| joint.release_ratio < share);
@@ -281,7 +318,12 @@ impl Detector {
     fn end(&mut self, stamp_ns: i64) {
         let quiet_ns = (self.quiet_secs * 1e9) as i64;
         let since_ns = self.detection.since_ns.unwrap_or(stamp_ns);
-        let is_doubtful = !self.stands_out && secs_between(since_ns, stamp_ns) < DOUBTFUL_SECS;
+        let was_short = secs_between(since_ns, stamp_ns) < DOUBTFUL_SECS;
+        let ended = Ended {
+            was_turn: was_short && self.turned.is_some(),
+            is_doubtful: was_short && !self.stands_out,
+            off_turns: self.is_off_turns,
+        };
         self.detection.in_contact = false;
         self.detection.since_ns = None;
         self.detection.first_link = None;
@@ -296,7 +338,7 @@ impl Detector {
         self.blocks.clear();
         for joint in &mut self.joints {
             joint.thaw(self.weighing.frozen_variance);
-            joint.settle(is_doubtful, self.is_off_turns, self.parameters.motion_std);
+            joint.settle(ended, self.parameters.motion_std);
         }
     }
 
@@ -328,6 +370,7 @@ impl Detector {
     pub fn reset(&mut self) {
         self.joints.fill(JointDetector::new(&self.parameters));
         self.charts.begin();
+        self.onset.forget();
         self.blocks.clear();
         self.last_ns = None;
         self.quiet_secs = 0.0;

@@ -1,5 +1,7 @@
 //! How fast the robot moves, as far as the detector needs to know.
 
+use super::joint::Turning;
+
 /// Time constant of the smoothing of joint speeds, s.
 const SMOOTHING_SECS: f64 = 0.02;
 /// How long motion goes on to count after it ended: what it left wrong is learned meanwhile, s.
@@ -13,6 +15,11 @@ const ACCELERATION_SECS: f64 = 0.05;
 const TURN_SECS: f64 = 0.3;
 const MOVING_SPEED: f64 = 0.03;
 const MOVED_SECS: f64 = 0.5;
+/// Speed below which friction jumps, rad/s, if the joint moved at least this fast, rad/s, and how long the charts of sudden
+/// changes show it, s.
+const JUMP_SPEED: f64 = 0.05;
+const CREEPING_SPEED: f64 = 0.003;
+const JUMP_SECS: f64 = 0.12;
 
 /// One joint's motion, in rad/s and rad/s².
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,6 +31,8 @@ struct JointMotion {
     peak: f64,
     /// How lately its speed changed its sign, 0 to 1.
     turned: f64,
+    /// How lately its speed was about zero, 0 to 1.
+    stood: f64,
 }
 
 impl JointMotion {
@@ -48,6 +57,15 @@ impl JointMotion {
             true => 1.0,
             false => self.turned * (-step_secs / TURN_SECS).exp(),
         };
+        // The smoothed speed lags.
+        let speed = self.velocity + SMOOTHING_SECS * self.acceleration;
+        let stands = (-(speed / JUMP_SPEED).powi(2)).exp();
+        self.stood = stands.max(self.stood * (-step_secs / JUMP_SECS).exp());
+    }
+
+    /// Whether the joint lately moved at this speed, rad/s, 0 to 1.
+    fn has_moved(&self, speed: f64) -> f64 {
+        (self.peak / speed).min(1.0).powi(2)
     }
 
     fn turning(&self) -> f64 {
@@ -56,8 +74,7 @@ impl JointMotion {
             true => (-(self.velocity / (self.acceleration * TURN_SECS)).powi(2)).exp(),
             false => 0.0,
         };
-        let has_moved = (self.peak / MOVING_SPEED).min(1.0).powi(2);
-        has_moved * will_turn.max(self.turned)
+        self.has_moved(MOVING_SPEED) * will_turn.max(self.turned)
     }
 }
 
@@ -65,7 +82,7 @@ impl JointMotion {
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
     joints: Vec<JointMotion>,
-    turning: Vec<f64>,
+    turning: Vec<Turning>,
     speed: f64,
     /// Whether there is only one position yet.
     has_begun: bool,
@@ -75,7 +92,7 @@ impl Motion {
     pub(super) fn new(dof: usize) -> Self {
         Self {
             joints: vec![JointMotion::default(); dof],
-            turning: vec![0.0; dof],
+            turning: vec![Turning::default(); dof],
             speed: 0.0,
             has_begun: true,
         }
@@ -89,7 +106,7 @@ impl Motion {
                 ..JointMotion::default()
             };
         }
-        self.turning.fill(0.0);
+        self.turning.fill(Turning::default());
         self.speed = 0.0;
         self.has_begun = true;
     }
@@ -111,7 +128,10 @@ impl Motion {
         }
         self.has_begun = false;
         for (turning, joint) in self.turning.iter_mut().zip(&self.joints) {
-            *turning = joint.turning();
+            *turning = Turning {
+                wide: joint.turning(),
+                narrow: joint.has_moved(CREEPING_SPEED) * joint.stood,
+            };
         }
         let lingering = self.speed * (-step_secs / LINGER_SECS).exp();
         self.speed = squares.sqrt().max(lingering);
@@ -127,8 +147,8 @@ impl Motion {
         self.speed / (self.speed + HALF_SPEED)
     }
 
-    /// Whether each joint turns back or stops, 0 to 1: there friction jumps, and what is known of it is wrong.
-    pub(super) fn turning(&self) -> &[f64] {
+    /// Whether each joint turns back or stops: there friction jumps, and what is known of it is wrong.
+    pub(super) fn turning(&self) -> &[Turning] {
         &self.turning
     }
 }
