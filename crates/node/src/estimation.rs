@@ -11,6 +11,7 @@ use r2r::Publisher;
 use r2r::geometry_msgs::msg::{PoseWithCovarianceStamped, WrenchStamped};
 use r2r::sensor_msgs::msg::JointState;
 use r2r::std_msgs::msg::Bool;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::drawing::{Drawing, Easel};
 use crate::order::{Asked, Order, Outcome};
@@ -94,6 +95,7 @@ impl Estimation {
         samples: &Newest<TimedSample>,
         orders: &Receiver<Asked>,
     ) -> r2r::Result<()> {
+        let _pool = join_pool();
         self.tell_detected(false)?;
         while !samples.is_closed() {
             for asked in orders.try_iter() {
@@ -214,9 +216,10 @@ impl Estimation {
         match self.intake.admit(sample) {
             Ok(admitted) => {
                 let estimate = self.filter.update(admitted).clone();
-                self.note(&estimate, begin.elapsed());
+                let step = begin.elapsed();
                 self.publish(&estimate)?;
                 self.publish_details(&estimate)?;
+                self.note(&estimate, step);
                 if self.easel.is_waiting() {
                     self.draw(sample, estimate);
                 }
@@ -313,4 +316,12 @@ impl Estimation {
     fn lock_progress(&self) -> std::sync::MutexGuard<'_, Progress> {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// A pool with this thread in it, for as long as it is kept: one outside it would hand each step over and wait to be
+/// woken.
+fn join_pool() -> Option<ThreadPool> {
+    let pool = ThreadPoolBuilder::new().use_current_thread().build();
+    pool.inspect_err(|refusal| tracing::warn!("estimating outside the pool: {refusal}"))
+        .ok()
 }
