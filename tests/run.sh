@@ -11,7 +11,6 @@ step() {
 
 # Without ROS, as on most machines: the node is a library only.
 step "Rust"
-env -u AMENT_PREFIX_PATH -u ROS_DISTRO cargo build --workspace
 env -u AMENT_PREFIX_PATH -u ROS_DISTRO cargo test --workspace
 
 step "ROS 2"
