@@ -25,68 +25,110 @@ const FRICTION: [(f64, f64); 5] = [
 pub(super) const FORCE_SCALE: f64 = 60.0;
 const STIFFNESS_SCALE: f64 = 2e4;
 
+/// A term of the evidence whose exponent is so much less than another one's changes nothing.
+const NEGLIGIBLE: f64 = 80.0;
+
 /// The evidence of the sums over a history. `path` are the joints that they belong to.
 pub(super) fn evidence(sums: &Sums, noise: &Noise, path: &[usize]) -> Evidence {
-    let mut best = Evidence {
-        log: f64::NEG_INFINITY,
-        ..Evidence::default()
-    };
-    let mut total = 0.0;
+    let mut total = Total::default();
+    let mut reduced = Reduced::default();
     for scale in 0..noise.bias_scales() {
-        let reduced = sums.reduced(noise, scale, path);
-        let before = best.log;
+        sums.reduce(noise, scale, path, &mut reduced);
+        let mut is_best = false;
         for (friction, prior) in FRICTION {
-            let one = evidence_at(&reduced, friction, scale);
-            let log = one.log + f64::ln(prior);
-            if log > best.log {
-                total = total * (best.log - log).exp() + 1.0;
-                best = Evidence { log, ..one };
-            } else {
-                total += (log - best.log).exp();
-            }
+            is_best |= total.add(&reduced, scale, friction, prior);
         }
-        if best.log > before {
+        if is_best {
             let Evidence {
                 force,
                 stiffness,
                 friction,
                 ..
-            } = best;
-            best.tilt = reduced.tilt([force, stiffness, friction * force, friction * stiffness]);
+            } = total.best;
+            total.best.tilt =
+                reduced.tilt([force, stiffness, friction * force, friction * stiffness]);
         }
     }
-    best.log += total.ln();
-    best
+    Evidence {
+        log: total.exponent + total.sum.ln(),
+        ..total.best
+    }
 }
 
-fn evidence_at(reduced: &Reduced, mu: f64, scale: usize) -> Evidence {
-    let p = &reduced.gram;
-    let a = [
-        p[0][0] + mu * (2.0 * p[0][2] + mu * p[2][2]),
-        p[0][1] + mu * (p[0][3] + p[1][2] + mu * p[2][3]),
-        p[1][1] + mu * (2.0 * p[1][3] + mu * p[3][3]),
-    ];
-    let r = [p[0][4] + mu * p[2][4], p[1][4] + mu * p[3][4]];
-    // Posterior precision of F₀ and K in units of the prior's scales.
-    let p00 = a[0] * FORCE_SCALE * FORCE_SCALE + 1.0;
-    let p01 = a[1] * FORCE_SCALE * STIFFNESS_SCALE;
-    let p11 = a[2] * STIFFNESS_SCALE * STIFFNESS_SCALE + 1.0;
-    let (r0, r1) = (r[0] * FORCE_SCALE, r[1] * STIFFNESS_SCALE);
-    let determinant = (p00 * p11 - p01 * p01).max(1e-300);
-    let force = (p11 * r0 - p01 * r1) / determinant;
-    let stiffness = (p00 * r1 - p01 * r0) / determinant;
-    let explained = 0.5 * (r0 * force + r1 * stiffness);
-    // Force and stiffness are positive: the share of the Gaussian that is, taken one by one.
-    let positive = log_normal_cdf(force / (p11 / determinant).sqrt())
-        + log_normal_cdf(stiffness / (p00 / determinant).sqrt());
-    Evidence {
-        log: reduced.log + explained - 0.5 * determinant.ln() + positive,
-        force: force * FORCE_SCALE,
-        stiffness: stiffness * STIFFNESS_SCALE,
-        friction: mu,
-        reference: 0.0,
-        bias_scale: scale,
-        tilt: Vector3::zeros(),
+/// A sum of terms, each a factor times e to an exponent, and the solution of the largest.
+struct Total {
+    /// The largest exponent, which the sum and the largest term are relative to.
+    exponent: f64,
+    sum: f64,
+    largest: f64,
+    best: Evidence,
+}
+
+impl Default for Total {
+    fn default() -> Self {
+        Self {
+            exponent: f64::NEG_INFINITY,
+            sum: 0.0,
+            largest: 0.0,
+            best: Evidence::default(),
+        }
+    }
+}
+
+impl Total {
+    /// Adds the evidence for one scale of the biases and one friction coefficient μ. Tells whether its term is the
+    /// largest.
+    fn add(&mut self, reduced: &Reduced, scale: usize, mu: f64, prior: f64) -> bool {
+        let p = &reduced.gram;
+        let a = [
+            p[0][0] + mu * (2.0 * p[0][2] + mu * p[2][2]),
+            p[0][1] + mu * (p[0][3] + p[1][2] + mu * p[2][3]),
+            p[1][1] + mu * (2.0 * p[1][3] + mu * p[3][3]),
+        ];
+        let r = [p[0][4] + mu * p[2][4], p[1][4] + mu * p[3][4]];
+        // Posterior precision of F₀ and K in units of the prior's scales.
+        let p00 = a[0] * FORCE_SCALE * FORCE_SCALE + 1.0;
+        let p01 = a[1] * FORCE_SCALE * STIFFNESS_SCALE;
+        let p11 = a[2] * STIFFNESS_SCALE * STIFFNESS_SCALE + 1.0;
+        let (r0, r1) = (r[0] * FORCE_SCALE, r[1] * STIFFNESS_SCALE);
+        let determinant = (p00 * p11 - p01 * p01).max(1e-300);
+        let force = (p11 * r0 - p01 * r1) / determinant;
+        let stiffness = (p00 * r1 - p01 * r0) / determinant;
+        let exponent = reduced.log + 0.5 * (r0 * force + r1 * stiffness);
+        if exponent < self.exponent - NEGLIGIBLE {
+            return false;
+        }
+        // Force and stiffness are positive: the share of the Gaussian that is, taken one by one.
+        let root = determinant.sqrt();
+        let pushes = normal_cdf(force * root / p11.sqrt());
+        let stiffens = normal_cdf(stiffness * root / p00.sqrt());
+        let factor = prior * pushes.factor * stiffens.factor / root;
+        let term = self.scaled(exponent + pushes.exponent + stiffens.exponent, factor);
+        self.sum += term;
+        let is_largest = term > self.largest;
+        if is_largest {
+            self.largest = term;
+            self.best = Evidence {
+                force: force * FORCE_SCALE,
+                stiffness: stiffness * STIFFNESS_SCALE,
+                friction: mu,
+                bias_scale: scale,
+                ..Evidence::default()
+            };
+        }
+        is_largest
+    }
+
+    /// A term in units of e to the largest exponent, which it may raise.
+    fn scaled(&mut self, exponent: f64, factor: f64) -> f64 {
+        if exponent <= self.exponent {
+            return factor * (exponent - self.exponent).exp();
+        }
+        let shrink = (self.exponent - exponent).exp();
+        self.sum *= shrink;
+        self.largest *= shrink;
+        self.exponent = exponent;
+        factor
     }
 }
 
@@ -116,12 +158,27 @@ impl Evidence {
     }
 }
 
-/// ln Φ(x) of the standard normal distribution, to 1e-3 relative where it matters.
-fn log_normal_cdf(x: f64) -> f64 {
+/// A factor times e to an exponent.
+struct Scaled {
+    exponent: f64,
+    factor: f64,
+}
+
+/// Φ(x) of the standard normal distribution, to 1e-3 relative where it matters.
+fn normal_cdf(x: f64) -> Scaled {
+    if x > 8.5 {
+        // One but for less than its rounding.
+        return Scaled {
+            exponent: 0.0,
+            factor: 1.0,
+        };
+    }
+    let squared = x * x;
+    let exponent = -0.5 * squared;
     if x < -5.0 {
         // Leading terms of the asymptotic series (Abramowitz and Stegun 1964, 26.2.12).
-        let squared = x * x;
-        return -0.5 * squared - (-x * 2.506_628_274_6).ln() + (1.0 - 1.0 / squared).ln();
+        let factor = (1.0 - 1.0 / squared) / (-x * 2.506_628_274_6);
+        return Scaled { exponent, factor };
     }
     // Abramowitz and Stegun 26.2.17, on the side where it is small.
     let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
@@ -129,10 +186,13 @@ fn log_normal_cdf(x: f64) -> f64 {
         * (0.319_381_530
             + t * (-0.356_563_782
                 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
-    let tail = 0.398_942_280_4 * (-0.5 * x * x).exp() * series;
+    let factor = 0.398_942_280_4 * series;
     if x > 0.0 {
-        (1.0 - tail).ln()
+        Scaled {
+            exponent: 0.0,
+            factor: 1.0 - factor * exponent.exp(),
+        }
     } else {
-        tail.ln()
+        Scaled { exponent, factor }
     }
 }

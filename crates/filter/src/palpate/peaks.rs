@@ -45,6 +45,11 @@ impl Peak {
     /// Prepares the climb from a first guess.
     pub(super) fn new(mut obstacle: Obstacle, history: &History) -> Self {
         let evidence = history.evidence(&mut obstacle);
+        Self::of(obstacle, evidence, history)
+    }
+
+    /// The same where the evidence is known.
+    pub(super) fn of(obstacle: Obstacle, evidence: Evidence, history: &History) -> Self {
         let touch = history.newest_touch(&obstacle);
         let link_from_root = history.newest_link_from_root(obstacle.link);
         Self {

@@ -184,18 +184,16 @@ pub(super) fn start(history: &History, candidate: &Candidate) -> Peak {
         &TURNS[..1]
     };
     let of_radius = |radius| {
-        let start = move |&turn: &Option<f64>| {
-            Peak::new(history.obstacle_at(&place, radius, turn), history)
-        };
+        let start = move |&turn: &Option<f64>| history.obstacle_at(&place, radius, turn);
         turns.iter().map(start)
     };
-    best(RADII.into_iter().flat_map(of_radius))
+    best(RADII.into_iter().flat_map(of_radius), history)
 }
 
 /// Where a climb as a bar from a peak begins.
 pub(super) fn bar(history: &History, ball: &Peak) -> Peak {
-    let start = |&turn: &Option<f64>| Peak::new(history.reshaped(&ball.obstacle, turn), history);
-    best(TURNS[1..].iter().map(start))
+    let start = |&turn: &Option<f64>| history.reshaped(&ball.obstacle, turn);
+    best(TURNS[1..].iter().map(start), history)
 }
 
 /// How a ball, and then how bars are turned about the normal, rad.
@@ -215,17 +213,16 @@ pub(super) fn drifting(history: &History, resting: &Obstacle) -> Peak {
     Peak::new(resting.drifting(Some(Vector3::zeros())), history)
 }
 
-fn best(starts: impl Iterator<Item = Peak>) -> Peak {
-    let better = |a: Peak, b: Peak| {
-        if b.evidence.log > a.evidence.log {
-            b
-        } else {
-            a
-        }
-    };
-    starts
-        .reduce(better)
-        .expect("a climb has at least one start")
+/// The start with the largest evidence.
+fn best(starts: impl Iterator<Item = Obstacle>, history: &History) -> Peak {
+    let weighed = starts.map(|mut obstacle| {
+        let evidence = history.evidence(&mut obstacle);
+        (obstacle, evidence)
+    });
+    let (obstacle, evidence) = weighed
+        .reduce(|a, b| if b.1.log > a.1.log { b } else { a })
+        .expect("a climb has at least one start");
+    Peak::of(obstacle, evidence, history)
 }
 
 /// Triangles of one link that a push on answers a question: the best minima, and some drawn.

@@ -61,13 +61,24 @@ struct Slackened {
     /// Variance s² of the slack, N².
     variance: f64,
     inverse: Matrix3<f64>,
-    /// A⁻¹ n and A⁻¹ t.
+    /// A⁻¹ n, A⁻¹ t and A⁻¹ h.
     push: Vector3<f64>,
     rub: Vector3<f64>,
-    /// G A⁻¹ n, G A⁻¹ t and A⁻¹ h.
-    with_push: Vector3<f64>,
-    with_rub: Vector3<f64>,
     with_torque: Vector3<f64>,
+}
+
+impl Slackened {
+    /// Without slack: A is one, and what is multiplied by the variance does not matter.
+    fn none(directions: &Directions) -> Self {
+        Self {
+            force: 0.0,
+            variance: 0.0,
+            inverse: Matrix3::identity(),
+            push: directions.push,
+            rub: directions.rub,
+            with_torque: Vector3::zeros(),
+        }
+    }
 }
 
 impl Sums {
@@ -84,21 +95,20 @@ impl Sums {
 
     /// Adds one keyframe with approach e = d₀ − d, m.
     pub(super) fn add(&mut self, e: f64, directions: &Directions, levers: &[Lever]) {
-        let (mut g, mut h) = (Matrix3::zeros(), Vector3::zeros());
-        for lever in levers {
-            let weighted = lever.row * lever.weight;
-            g += weighted * lever.row.transpose();
-            h += weighted * lever.measured;
-        }
-        let slackened = self.slacken(directions, &g, &h);
-        self.add_columns(e, directions, &slackened);
-        self.gram[4][4] -= slackened.variance * h.dot(&slackened.with_torque);
-        for (index, lever) in levers.iter().enumerate() {
-            self.add_bias(e, index, lever, &slackened);
-        }
-        if self.likeness.tilt() > 0.0 {
-            self.mix(levers, &slackened, &g);
-            self.add_tilt(e, levers.len(), &slackened);
+        match self.likeness.is_smooth() {
+            false => self.add_levers(e, directions, &Slackened::none(directions), levers),
+            true => {
+                let (mut g, mut h) = (Matrix3::zeros(), Vector3::zeros());
+                for lever in levers {
+                    let weighted = lever.row * lever.weight;
+                    g += weighted * lever.row.transpose();
+                    h += weighted * lever.measured;
+                }
+                let slackened = self.slacken(directions, &g, &h);
+                self.add_levers(e, directions, &slackened, levers);
+                self.mix(levers, &slackened, &g);
+                self.add_tilt(e, levers.len(), &slackened, &g);
+            }
         }
     }
 
@@ -109,8 +119,7 @@ impl Sums {
         h: &Vector3<f64>,
     ) -> Slackened {
         let Directions { push, rub } = directions;
-        let (g_push, g_rub) = (g * push, g * rub);
-        let force = push.dot(h).max(0.0) / (push.dot(&g_push) + FORCE_SCALE.powi(-2));
+        let force = push.dot(h).max(0.0) / (push.dot(&(g * push)) + FORCE_SCALE.powi(-2));
         let variance = (self.likeness.slack() * force).powi(2);
         let a = Matrix3::identity() + g * variance;
         let mut inverse = a;
@@ -123,45 +132,51 @@ impl Sums {
             variance,
             push: inverse * push,
             rub: inverse * rub,
-            with_push: inverse * g_push,
-            with_rub: inverse * g_rub,
             with_torque: inverse * h,
             inverse,
         }
     }
 
-    fn add_columns(&mut self, e: f64, directions: &Directions, slackened: &Slackened) {
-        let Directions { push, rub } = directions;
-        let nn = push.dot(&slackened.with_push);
-        let nt = rub.dot(&slackened.with_push);
-        let tt = rub.dot(&slackened.with_rub);
-        let ny = push.dot(&slackened.with_torque);
-        let ty = rub.dot(&slackened.with_torque);
+    /// Adds the products of the columns with each other and with the biases.
+    fn add_levers(
+        &mut self,
+        e: f64,
+        directions: &Directions,
+        slackened: &Slackened,
+        levers: &[Lever],
+    ) {
+        let [mut nn, mut nt, mut tt, mut ny, mut ty, mut yy] = [0.0; 6];
+        for (index, lever) in levers.iter().enumerate() {
+            let Lever {
+                row,
+                measured: y,
+                weight,
+            } = lever;
+            let (n, t) = (row.dot(&directions.push), row.dot(&directions.rub));
+            let with_n = weight * row.dot(&slackened.push);
+            let with_t = weight * row.dot(&slackened.rub);
+            let with_y = weight * (y - slackened.variance * row.dot(&slackened.with_torque));
+            nn += with_n * n;
+            nt += with_n * t;
+            tt += with_t * t;
+            ny += with_n * y;
+            ty += with_t * y;
+            yy += with_y * y;
+            self.mixed[index][index] += weight;
+            self.add_row(index, e, with_n, with_t, with_y);
+        }
         let products = [
             [nn, nn * e, nt, nt * e, ny],
             [0.0, nn * e * e, nt * e, nt * e * e, ny * e],
             [0.0, 0.0, tt, tt * e, ty],
             [0.0, 0.0, 0.0, tt * e * e, ty * e],
+            [0.0, 0.0, 0.0, 0.0, yy],
         ];
         for (sums, products) in self.gram.iter_mut().zip(&products) {
             for (sum, product) in sums.iter_mut().zip(products) {
                 *sum += product;
             }
         }
-    }
-
-    fn add_bias(&mut self, e: f64, index: usize, lever: &Lever, slackened: &Slackened) {
-        let weight = lever.weight;
-        self.gram[4][4] += weight * lever.measured * lever.measured;
-        self.mixed[index][index] += weight;
-        let explained = slackened.variance * lever.row.dot(&slackened.with_torque);
-        self.add_row(
-            index,
-            e,
-            weight * lever.row.dot(&slackened.push),
-            weight * lever.row.dot(&slackened.rub),
-            weight * (lever.measured - explained),
-        );
     }
 
     /// Adds what the slack and the tilt have to do with the biases, and the tilt with itself.
@@ -185,14 +200,15 @@ impl Sums {
         }
     }
 
-    fn add_tilt(&mut self, e: f64, joints: usize, slackened: &Slackened) {
+    fn add_tilt(&mut self, e: f64, joints: usize, slackened: &Slackened, g: &Matrix3<f64>) {
         let force = slackened.force;
+        let (with_push, with_rub) = (g * slackened.push, g * slackened.rub);
         for axis in 0..3 {
             self.add_row(
                 joints + axis,
                 e,
-                force * slackened.with_push[axis],
-                force * slackened.with_rub[axis],
+                force * with_push[axis],
+                force * with_rub[axis],
                 force * slackened.with_torque[axis],
             );
         }
@@ -205,15 +221,25 @@ impl Sums {
         }
     }
 
-    /// The products of the columns with the nuisances integrated out, for biases of one scale.
-    pub(super) fn reduced(&self, noise: &Noise, scale: usize, path: &[usize]) -> Reduced {
+    /// Integrates the nuisances out, for biases of one scale.
+    pub(super) fn reduce(
+        &self,
+        noise: &Noise,
+        scale: usize,
+        path: &[usize],
+        reduced: &mut Reduced,
+    ) {
         let tilt = self.likeness.tilt();
         let count = path.len() + if tilt > 0.0 { 3 } else { 0 };
-        let mut gram = self.gram;
-        let mut factor = [[0.0; MOST_NUISANCES]; MOST_NUISANCES];
-        let mut white = [[0.0; COLUMNS]; MOST_NUISANCES];
+        let Reduced {
+            gram,
+            factor,
+            white,
+            ..
+        } = reduced;
+        *gram = self.gram;
         // What the priors make of the determinant, by Cholesky's factorisation row by row.
-        let mut log_determinant = 0.0;
+        let mut determinant = 1.0;
         for i in 0..count {
             let (mean, precision) = match path.get(i) {
                 Some(&joint) => {
@@ -226,7 +252,9 @@ impl Sums {
             let mut row = self.rows[i];
             row[COLUMNS - 1] += precision * mean;
             gram[COLUMNS - 1][COLUMNS - 1] += precision * mean * mean;
-            for j in 0..i {
+            // On the mesh itself the nuisances are the biases, which have nothing to do with each other.
+            let coupled = if tilt > 0.0 { i } else { 0 };
+            for j in 0..coupled {
                 let before = factor[i][..j].iter().zip(&factor[j][..j]);
                 let known: f64 = before.map(|(one, other)| one * other).sum();
                 let entry = (self.mixed[i][j] - known) * factor[j][j];
@@ -237,7 +265,7 @@ impl Sums {
                 }
             }
             let pivot = pivot.max(1e-9);
-            log_determinant += (pivot / precision).ln();
+            determinant *= pivot / precision;
             // Of the diagonal only the inverse is needed.
             factor[i][i] = pivot.sqrt().recip();
             white[i] = row.map(|value| value * factor[i][i]);
@@ -248,17 +276,13 @@ impl Sums {
             }
         }
         let log_noise = noise.base_beside(scale, path) - self.log_slack;
-        Reduced {
-            log: log_noise - 0.5 * (log_determinant + gram[4][4]),
-            gram,
-            factor,
-            white,
-            joints: path.len(),
-        }
+        reduced.log = log_noise - 0.5 * (determinant.ln() + reduced.gram[4][4]);
+        reduced.joints = path.len();
     }
 }
 
 /// [`Sums`] with the nuisances integrated out.
+#[derive(Default)]
 pub(super) struct Reduced {
     /// Products of the columns with each other; row ≤ column.
     pub(super) gram: [[f64; COLUMNS]; COLUMNS],
