@@ -93,9 +93,9 @@ impl SmoothBody {
     /// that there is no single closest point.
     fn seek(&self, query: &Point3<f64>, mut foot: Foot) -> Option<SmoothPoint> {
         let mut left = NONE;
+        let mut patch = &self.patches[foot.triangle as usize];
+        let mut local = patch.to_plane(query);
         for _ in 0..MOST_STEPS {
-            let patch = &self.patches[foot.triangle as usize];
-            let local = patch.to_plane(query);
             let step = patch.step(&local, &foot.at)?;
             foot.at += step;
             let Some(edge) = patch.edge_crossed(&foot.at) else {
@@ -115,7 +115,9 @@ impl SmoothBody {
             }
             left = foot.triangle;
             let point = patch.to_link(&foot.at.push(0.0));
-            let at = self.patches[next as usize].to_plane(&point).xy();
+            patch = &self.patches[next as usize];
+            local = patch.to_plane(query);
+            let at = patch.to_plane(&point).xy();
             foot = Foot { triangle: next, at };
         }
         Some(self.above(query, &foot))

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix3x2, Point3, Rotation3, SVector, Unit, Vector3};
 
-use super::obstacle::{Core, LINK_RADIUS, RADIUS_RANGE, Shape, Touch, touch};
+use super::obstacle::{Core, LINK_RADIUS, RADIUS_RANGE, Shape, Spot, Touch, touch};
 
 /// Number of coordinates of an obstacle.
 pub(super) const COORDINATES: usize = 7;
@@ -80,7 +80,7 @@ impl Chart {
                 axis: None,
                 drift: None,
             };
-            let normal = touch(shape, &ball, self.triangle, 0.0).normal;
+            let normal = touch(shape, &ball, self.triangle, Spot::CENTRE).normal;
             tangential(&axis, &normal, x[3])
         });
         let change = Vector3::new(x[4], x[5], x[6]);

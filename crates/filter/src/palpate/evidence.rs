@@ -31,7 +31,7 @@ const NEGLIGIBLE: f64 = 80.0;
 /// The evidence of the sums over a history. `path` are the joints that they belong to.
 pub(super) fn evidence(sums: &Sums, noise: &Noise, path: &[usize]) -> Evidence {
     let mut total = Total::default();
-    let mut reduced = Reduced::default();
+    let mut reduced = Reduced::new();
     for scale in 0..noise.bias_scales() {
         sums.reduce(noise, scale, path, &mut reduced);
         let mut is_best = false;

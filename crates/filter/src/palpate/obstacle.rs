@@ -16,6 +16,9 @@ use crate::skin::Skin;
 const STICKING_SPEED: f64 = 2e-4;
 /// Half the length of a bar, m.
 const BAR_HALF_LENGTH: f64 = 0.3;
+/// How far to go at first for how far a projection is off, and the range of what was learned since.
+const FIRST_STRIDE: f64 = 2.0;
+const STRIDES: [f64; 2] = [1.0, 64.0];
 /// Most projections that finding the contact along a bar costs.
 const MOST_BAR_LOOKS: usize = 16;
 /// Typical radius of a link, m.
@@ -30,7 +33,7 @@ pub(super) const RADIUS_RANGE: [f64; 2] = [1e-3, 1.0];
 
 /// The core of the obstacle, in some frame: a point, or a line for poles and edges. Its surface is at an unknown
 /// radius r around the core, which the stiffness and force absorb.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Core {
     /// Centre c of the curvature: the point of the core nearest to the link, m.
     pub(super) centre: Point3<f64>,
@@ -64,7 +67,7 @@ impl Core {
 }
 
 /// An obstacle and the link that it touches.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Obstacle {
     pub(super) link: u16,
     /// What the link is taken for.
@@ -92,13 +95,29 @@ pub(super) struct Touch {
     pub(super) normal: Unit<Vector3<f64>>,
     /// Distance d from the core to the link, m; negative inside.
     pub(super) distance: f64,
-    /// Way from the core's centre to its point nearest to the link, along a bar's axis, m.
-    pub(super) along: f64,
+    /// Where on the core its point nearest to the link is.
+    pub(super) spot: Spot,
 }
 
-/// The contact: the link's point nearest to the core (the paper's figure 2). For a bar, `along` is a first guess of
-/// the way along its axis.
-pub(super) fn touch(shape: &Shape, core_in_link: &Core, start: u32, along: f64) -> Touch {
+/// Where along a bar the contact is, and what finding the next one begins with.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    /// Way from the core's centre along the axis, m.
+    pub(super) along: f64,
+    /// How far to go for how far the projection is off.
+    stride: f64,
+}
+
+impl Spot {
+    /// The centre.
+    pub(super) const CENTRE: Self = Self {
+        along: 0.0,
+        stride: FIRST_STRIDE,
+    };
+}
+
+/// The contact: the link's point nearest to the core (the paper's figure 2). For a bar, `guess` is where it may be.
+pub(super) fn touch(shape: &Shape, core_in_link: &Core, start: u32, guess: Spot) -> Touch {
     let Some(axis) = core_in_link.axis else {
         return touch_ball(shape, &core_in_link.centre, start);
     };
@@ -107,38 +126,48 @@ pub(super) fn touch(shape: &Shape, core_in_link: &Core, start: u32, along: f64) 
         let touch = touch_ball(shape, &centre, start);
         // Zero where the point of the bar is the one nearest to its own projection.
         let miss = axis.dot(&(touch.point - centre));
-        (Touch { along, ..touch }, miss)
+        (touch, along, miss)
     };
-    let (mut best, mut miss) = at(along, start);
+    let (mut best, mut along, mut miss) = at(guess.along, start);
     // On a convex link the miss falls along the bar: steeply where the contact is on an edge or a corner of the mesh,
     // hardly where it is on a triangle. So a step may be far too short, and the next one goes farther, until the sign
     // changes; from then on the contact lies between two places.
     let mut other: Option<(f64, f64)> = None;
-    let mut stride = 2.0;
+    let mut stride = guess.stride;
+    let mut learned = guess.stride;
     for _ in 0..MOST_BAR_LOOKS {
         if miss.abs() < bar_tolerance(best.distance) {
             break;
         }
         let next = match other {
-            None => best.along + stride * miss,
-            Some((there, its_miss)) => between((best.along, miss), (there, its_miss)),
+            None => along + stride * miss,
+            Some((there, its_miss)) => between((along, miss), (there, its_miss)),
         };
         let next = next.clamp(-BAR_HALF_LENGTH, BAR_HALF_LENGTH);
-        if next == best.along {
+        if next == along {
             break;
         }
-        let (touch, next_miss) = at(next, best.triangle);
+        let (touch, next, next_miss) = at(next, best.triangle);
+        learned = (next - along) / (miss - next_miss);
         if (next_miss < 0.0) != (miss < 0.0) {
-            other = Some((best.along, miss));
+            other = Some((along, miss));
         } else if let Some((_, its_miss)) = &mut other {
             // The far end weighs half, so that it is left behind (the Illinois method: Dowell and Jarratt 1971).
             *its_miss *= 0.5;
         } else {
             stride *= 4.0;
         }
-        (best, miss) = (touch, next_miss);
+        (best, along, miss) = (touch, next, next_miss);
     }
-    best
+    let [least, most] = STRIDES;
+    let stride = match learned.is_finite() {
+        true => learned.clamp(least, most),
+        false => FIRST_STRIDE,
+    };
+    Touch {
+        spot: Spot { along, stride },
+        ..best
+    }
 }
 
 /// Where a line through two values of opposite sign is zero.
@@ -161,7 +190,7 @@ fn touch_ball(shape: &Shape, centre: &Point3<f64>, start: u32) -> Touch {
             triangle: nearest.triangle,
             normal: nearest.normal,
             distance: nearest.distance,
-            along: 0.0,
+            spot: Spot::CENTRE,
         };
     }
     let nearest = surface.closest_point_from(centre, start);
@@ -178,7 +207,7 @@ fn touch_ball(shape: &Shape, centre: &Point3<f64>, start: u32) -> Touch {
         triangle: nearest.triangle,
         normal,
         distance: side * distance,
-        along: 0.0,
+        spot: Spot::CENTRE,
     }
 }
 
@@ -219,7 +248,7 @@ impl Obstacle {
             &self.shape(skin),
             &self.core.moved(link_from_root),
             self.triangle,
-            0.0,
+            Spot::CENTRE,
         )
     }
 
@@ -252,7 +281,7 @@ impl Obstacle {
         };
         self.triangle = newest.triangle;
         if let Some(axis) = self.core.axis {
-            self.core.centre += axis.into_inner() * newest.along;
+            self.core.centre += axis.into_inner() * newest.spot.along;
         }
         Evidence {
             reference: newest.distance,
@@ -269,13 +298,13 @@ impl Obstacle {
     ) {
         let link = self.link as usize;
         let shape = self.shape(skin);
-        let (mut start, mut along) = (self.triangle, 0.0);
+        let (mut start, mut spot) = (self.triangle, Spot::CENTRE);
         let newest_secs = keyframes.last().map_or(0.0, |newest| newest.secs);
         for (index, keyframe) in keyframes.iter().enumerate().rev() {
             let core = self.core.after(keyframe.secs - newest_secs);
             let core = core.moved(&keyframe.links[link].link_from_root);
-            let touch = touch(&shape, &core, start, along);
-            (start, along) = (touch.triangle, touch.along);
+            let touch = touch(&shape, &core, start, spot);
+            (start, spot) = (touch.triangle, touch.spot);
             visit(index, keyframe, touch);
         }
     }

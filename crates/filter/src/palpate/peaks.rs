@@ -34,6 +34,8 @@ pub(super) struct Peak {
     pub(super) rests: bool,
     chart: Chart,
     precision: Square,
+    /// Log of the volume of its Gaussian.
+    log_volume: f64,
     /// Lower Cholesky factor of the covariance.
     root: Square,
     /// Covariance of the contact point from systematic errors, m², in the link's frame, once it was
@@ -55,6 +57,7 @@ impl Peak {
         Self {
             chart: Chart::new(link_from_root, &obstacle.core, &touch),
             log_mass: evidence.log,
+            log_volume: 0.0,
             precision: Square::identity(),
             root: Square::identity(),
             rests: false,
@@ -65,11 +68,16 @@ impl Peak {
         }
     }
 
+    /// Takes the newest keyframe in.
+    pub(super) fn refresh(&mut self, history: &History) {
+        self.evidence = history.evidence(&mut self.obstacle);
+    }
+
     /// One step of Newton's method with all derivatives by finite differences.
     pub(super) fn step(&mut self, history: &History) {
         *self = Self {
             sight: self.sight,
-            ..Self::new(self.obstacle, history)
+            ..Self::of(self.obstacle, self.evidence, history)
         };
         let counting = self.chart.counting();
         let value = |x: &Coordinates| self.try_at(x, history).2;
@@ -116,7 +124,8 @@ impl Peak {
         self.root = covariance
             .cholesky()
             .map_or_else(Square::zeros, |factor| factor.l());
-        self.log_mass = log_posterior + self.log_gaussian() - self.log_direction();
+        self.log_volume = self.log_gaussian();
+        self.log_mass = log_posterior + self.log_volume - self.log_direction();
         covariance
     }
 
@@ -221,7 +230,7 @@ impl Peak {
             share * (-0.5 * squared / (width * width)).exp() / width.powi(dimension)
         };
         let mixture: f64 = WIDTHS.into_iter().map(part).sum();
-        mixture.max(f64::MIN_POSITIVE).ln() - self.log_gaussian() - log_volume
+        mixture.max(f64::MIN_POSITIVE).ln() - self.log_volume - log_volume
     }
 
     /// Whether another peak is the same one; or would be, if it rested as this one does, and explains hardly more.

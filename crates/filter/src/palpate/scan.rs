@@ -126,7 +126,7 @@ impl Terms {
 }
 
 /// A triangle that explains a keyframe's torques better than its neighbours do.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Candidate {
     link: usize,
     likeness: Likeness,

@@ -7,7 +7,8 @@ use super::agenda::Phase;
 use super::history::History;
 use super::obstacle::Obstacle;
 use super::peaks::{MOST, Peak, keep_best, keep_best_of_each, keep_likely, step_cost};
-use super::{PalpateFilter, history, scan};
+use super::scan::{self, Candidate};
+use super::{PalpateFilter, history};
 use crate::random::{Purpose, stream};
 use crate::step::Step;
 
@@ -58,8 +59,13 @@ impl PalpateFilter {
             let link = links[index / scan::QUESTIONS];
             scan::candidates(&history, link, index % scan::QUESTIONS, keys)
         };
-        let asked = portion.into_par_iter().flat_map_iter(ask);
-        self.bench.candidates.par_extend(asked);
+        let asked: Vec<Candidate> = portion.into_par_iter().flat_map_iter(ask).collect();
+        // Questions often have the same answer.
+        for candidate in asked {
+            if !self.bench.candidates.contains(&candidate) {
+                self.bench.candidates.push(candidate);
+            }
+        }
         if self.agenda.done == total {
             self.agenda.enter(Phase::Screen);
         }

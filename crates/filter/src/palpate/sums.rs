@@ -18,7 +18,13 @@ pub(super) const COLUMNS: usize = 5;
 const MOST_NUISANCES: usize = MOST_JOINTS + 3;
 
 type Rows = [[f64; COLUMNS]; MOST_NUISANCES];
-type Square = [[f64; MOST_NUISANCES]; MOST_NUISANCES];
+/// The lower triangle of a symmetric matrix, row by row.
+type Lower = [f64; MOST_NUISANCES * (MOST_NUISANCES + 1) / 2];
+
+/// Where a row of a [`Lower`] begins.
+const fn row_of(row: usize) -> usize {
+    row * (row + 1) / 2
+}
 
 /// How one joint of the path feels a force at the contact in one keyframe.
 #[derive(Clone, Copy, Debug, Default)]
@@ -48,8 +54,8 @@ pub(super) struct Sums {
     gram: [[f64; COLUMNS]; COLUMNS],
     /// Products of the nuisances with the columns.
     rows: Rows,
-    /// Products of the nuisances with each other; row ≥ column.
-    mixed: Square,
+    /// Products of the nuisances with each other.
+    mixed: Lower,
     /// Half of the log of what the slack multiplies the determinant of the noise covariance by.
     log_slack: f64,
 }
@@ -88,7 +94,7 @@ impl Sums {
             likeness,
             gram: [[0.0; COLUMNS]; COLUMNS],
             rows: [[0.0; COLUMNS]; MOST_NUISANCES],
-            mixed: [[0.0; MOST_NUISANCES]; MOST_NUISANCES],
+            mixed: [0.0; row_of(MOST_NUISANCES)],
             log_slack: 0.0,
         }
     }
@@ -162,7 +168,7 @@ impl Sums {
             ny += with_n * y;
             ty += with_t * y;
             yy += with_y * y;
-            self.mixed[index][index] += weight;
+            self.mixed[row_of(index) + index] += weight;
             self.add_row(index, e, with_n, with_t, with_y);
         }
         let products = [
@@ -183,19 +189,22 @@ impl Sums {
     fn mix(&mut self, levers: &[Lever], slackened: &Slackened, g: &Matrix3<f64>) {
         let force = slackened.force;
         let tilt = slackened.inverse * g * (force * force);
-        let (of_joints, of_tilt) = self.mixed.split_at_mut(levers.len());
+        let joints = levers.len();
+        let tilt_rows = [0, 1, 2].map(|axis| row_of(joints + axis));
         for (index, lever) in levers.iter().enumerate() {
             let pulled = slackened.inverse * lever.row * lever.weight;
-            for (other, mixed) in levers[..=index].iter().zip(&mut of_joints[index]) {
-                *mixed -= other.weight * slackened.variance * other.row.dot(&pulled);
+            let slack = pulled * slackened.variance;
+            let row = &mut self.mixed[row_of(index)..=row_of(index) + index];
+            for (other, mixed) in levers.iter().zip(row) {
+                *mixed -= other.weight * other.row.dot(&slack);
             }
-            for axis in 0..3 {
-                of_tilt[axis][index] += force * pulled[axis];
+            for (axis, row) in tilt_rows.into_iter().enumerate() {
+                self.mixed[row + index] += force * pulled[axis];
             }
         }
-        for axis in 0..3 {
+        for (axis, row) in tilt_rows.into_iter().enumerate() {
             for other in 0..=axis {
-                of_tilt[axis][levers.len() + other] += tilt[(axis, other)];
+                self.mixed[row + joints + other] += tilt[(axis, other)];
             }
         }
     }
@@ -248,17 +257,18 @@ impl Sums {
                 }
                 None => (0.0, 1.0 / (tilt * tilt)),
             };
-            let mut pivot = self.mixed[i][i] + precision;
+            let start = row_of(i);
+            let mut pivot = self.mixed[start + i] + precision;
             let mut row = self.rows[i];
             row[COLUMNS - 1] += precision * mean;
             gram[COLUMNS - 1][COLUMNS - 1] += precision * mean * mean;
             // On the mesh itself the nuisances are the biases, which have nothing to do with each other.
             let coupled = if tilt > 0.0 { i } else { 0 };
             for j in 0..coupled {
-                let before = factor[i][..j].iter().zip(&factor[j][..j]);
-                let known: f64 = before.map(|(one, other)| one * other).sum();
-                let entry = (self.mixed[i][j] - known) * factor[j][j];
-                factor[i][j] = entry;
+                let (own, other) = (&factor[start..start + j], &factor[row_of(j)..][..=j]);
+                let known: f64 = own.iter().zip(other).map(|(one, other)| one * other).sum();
+                let entry = (self.mixed[start + j] - known) * other[j];
+                factor[start + j] = entry;
                 pivot -= entry * entry;
                 for (value, other) in row.iter_mut().zip(&white[j]) {
                     *value -= entry * other;
@@ -267,8 +277,9 @@ impl Sums {
             let pivot = pivot.max(1e-9);
             determinant *= pivot / precision;
             // Of the diagonal only the inverse is needed.
-            factor[i][i] = pivot.sqrt().recip();
-            white[i] = row.map(|value| value * factor[i][i]);
+            let scale = pivot.sqrt().recip();
+            factor[start + i] = scale;
+            white[i] = row.map(|value| value * scale);
             for (row, sums) in gram.iter_mut().enumerate() {
                 for column in row..COLUMNS {
                     sums[column] -= white[i][row] * white[i][column];
@@ -282,20 +293,30 @@ impl Sums {
 }
 
 /// [`Sums`] with the nuisances integrated out.
-#[derive(Default)]
 pub(super) struct Reduced {
     /// Products of the columns with each other; row ≤ column.
     pub(super) gram: [[f64; COLUMNS]; COLUMNS],
     /// Log density of the torques if nothing pushed.
     pub(super) log: f64,
     /// Cholesky's factor of the nuisances' precision, with the inverse of its diagonal.
-    factor: Square,
+    factor: Lower,
     /// The nuisances' products with the columns, the factor divided out.
     white: Rows,
     joints: usize,
 }
 
 impl Reduced {
+    /// Room for them.
+    pub(super) fn new() -> Self {
+        Self {
+            gram: [[0.0; COLUMNS]; COLUMNS],
+            log: 0.0,
+            factor: [0.0; row_of(MOST_NUISANCES)],
+            white: [[0.0; COLUMNS]; MOST_NUISANCES],
+            joints: 0,
+        }
+    }
+
     /// Most probable tilt ε, for each column's coefficient but the torque's.
     pub(super) fn tilt(&self, coefficients: [f64; COLUMNS - 1]) -> Vector3<f64> {
         let mut tilt = Vector3::zeros();
@@ -306,9 +327,9 @@ impl Reduced {
                 rest -= coefficient * column;
             }
             for later in axis + 1..3 {
-                rest -= self.factor[self.joints + later][row] * tilt[later];
+                rest -= self.factor[row_of(self.joints + later) + row] * tilt[later];
             }
-            tilt[axis] = rest * self.factor[row][row];
+            tilt[axis] = rest * self.factor[row_of(row) + row];
         }
         tilt
     }

@@ -186,9 +186,10 @@ impl PalpateFilter {
         let total = self.peaks.len();
         let portion = self.portion(total, step_cost(&self.peaks));
         let history = history(step, &self.memory, &self.noise);
-        self.peaks[portion]
-            .par_iter_mut()
-            .for_each(|peak| peak.step(&history));
+        self.peaks[portion].par_iter_mut().for_each(|peak| {
+            peak.refresh(&history);
+            peak.step(&history);
+        });
         if self.agenda.done == total {
             self.agenda.enter(Phase::Hop(0));
         }
