@@ -3,7 +3,7 @@
 //! The order and the results depend on nothing but the samples: a portion is counted in looks at a keyframe, never in
 //! seconds.
 
-/// Looks at a keyframe that a second of samples pays for; one costs about 0.2 µs of one core.
+/// Looks at a keyframe that a second of samples pays for; one costs about 2,000 instructions.
 const LOOKS_PER_SEC: f64 = 1.5e6;
 
 /// Kinds of work, in their order.

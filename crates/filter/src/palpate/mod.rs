@@ -37,7 +37,7 @@ pub(crate) use evidence::MOST_JOINTS;
 use history::History;
 use memory::Memory;
 use noise::Noise;
-use obstacle::Obstacle;
+use obstacle::{Obstacle, Spot, touch};
 pub use parameters::PalpateParameters;
 use peaks::Peak;
 use work::Workbench;
@@ -54,6 +54,8 @@ struct Hypothesis {
     evidence: Evidence,
     log_prior: f64,
     log_weight: f64,
+    /// Where on a bar the contact was when last shown.
+    spot: Spot,
 }
 
 /// The filter of this project.
@@ -217,16 +219,19 @@ impl PalpateFilter {
         let since_secs = self.memory.since_newest_secs();
         cloud.extend(
             self.particles
-                .iter()
+                .iter_mut()
                 .zip(&self.weights)
                 .map(|(particle, &weight)| {
                     let link = particle.obstacle.link as usize;
                     let link_from_root = step.now.root_from_link(link).inverse();
-                    let obstacle = Obstacle {
-                        core: particle.obstacle.core.after(since_secs),
-                        ..particle.obstacle
-                    };
-                    let touch = obstacle.touch(step.skin, &link_from_root);
+                    let core = particle.obstacle.core.after(since_secs);
+                    let touch = touch(
+                        &particle.obstacle.shape(step.skin),
+                        &core.moved(&link_from_root),
+                        particle.obstacle.triangle,
+                        particle.spot,
+                    );
+                    particle.spot = touch.spot;
                     Particle {
                         link,
                         point_in_link: touch.point,

@@ -8,7 +8,7 @@ use super::Hypothesis;
 use super::chart::tangential;
 use super::history::History;
 use super::likeness::Likeness;
-use super::obstacle::{Core, Obstacle};
+use super::obstacle::{Core, Obstacle, Spot};
 use super::peaks::Peak;
 
 /// How far a slide goes, m, and how far a radial move on the logarithm of the radius.
@@ -81,6 +81,7 @@ impl<'a> Proposals<'a> {
                 obstacle,
                 evidence,
                 log_prior,
+                spot: Spot::CENTRE,
                 ..*particle
             };
         }

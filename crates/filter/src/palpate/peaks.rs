@@ -259,8 +259,8 @@ impl Peak {
 pub(super) fn step_cost(peaks: &[Peak]) -> usize {
     let of_one = |peak: &Peak| {
         let dimension = peak.counting().len();
-        // The derivatives, and about two on the way.
-        3 + dimension * (dimension + 3) / 2
+        // The derivatives, and one or two on the way.
+        2 + dimension * (dimension + 3) / 2
     };
     peaks.iter().map(of_one).sum::<usize>() / peaks.len().max(1)
 }

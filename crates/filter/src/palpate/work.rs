@@ -10,7 +10,7 @@ use super::history::{History, Place};
 use super::likeness::Likeness;
 use super::moves::Proposals;
 use super::noise::Calibration;
-use super::obstacle::RADIUS_RANGE;
+use super::obstacle::{RADIUS_RANGE, Spot};
 use super::peaks::{Peak, step_cost};
 use super::scan::Candidate;
 use super::{Hypothesis, PalpateFilter, PalpateParameters, crowd, history, sight};
@@ -258,6 +258,7 @@ fn draw(history: &History, random: &mut impl Rng) -> Hypothesis {
         evidence,
         log_prior,
         log_weight: evidence.log,
+        spot: Spot::CENTRE,
     }
 }
 
@@ -270,5 +271,6 @@ fn reweighed(particle: &Hypothesis, history: &History) -> Hypothesis {
         log_weight: particle.log_weight + evidence.log - particle.evidence.log,
         obstacle,
         evidence,
+        spot: Spot::CENTRE,
     }
 }
