@@ -4,7 +4,7 @@
 //! seconds.
 
 /// Looks at a keyframe that a second of samples pays for; one costs about 2,000 instructions.
-const LOOKS_PER_SEC: f64 = 1.5e6;
+const LOOKS_PER_SEC: f64 = 1.2e6;
 
 /// Kinds of work, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
