@@ -1,14 +1,14 @@
 //! Is anything touching? A bank of control charts a joint, on what the torque is off its learned bias.
 //!
 //! Each joint's residual is smoothed exponentially with several time constants (Roberts 1959), short ones for hard pushes
-//! and long ones for soft ones. A smoothed residual that exceeds so many of its standard deviations that noise does it at
-//! most at the stated rate ([`alarm`]) is a contact. The standard deviation is learned while nothing touches ([`noise`]):
-//! white noise from second differences, what does not average out from the smoothed residuals themselves, so that noise
-//! may be correlated or quantised, and what grows with motion or comes where a joint turns back ([`motion`]), as friction
-//! does ([`turns`]). Beside these are charts of sudden changes, of what the joints beyond do not explain of a joint's torque
-//! ([`onset`]): they notice pushes soonest, in fast motion too. The bias is a slow random walk ([`bias`]), faster in motion.
-//! What was learned shortly before a contact is taken
-//! back ([`blocks`]), and nothing is learned during one.
+//! and long ones for soft ones. A smoothed residual that with two samples in a row exceeds so many of its standard
+//! deviations that noise does it at most at the stated rate ([`alarm`]) is a contact. The standard deviation is learned
+//! while nothing touches ([`noise`]): white noise from second differences, what does not average out from the smoothed
+//! residuals themselves, so that noise may be correlated or quantised, and what grows with motion or comes where a joint
+//! turns back ([`motion`]), as friction does ([`turns`]). Beside these are charts of sudden changes, of what the joints
+//! beyond do not explain of a joint's torque ([`onset`]): they notice pushes soonest, in fast motion too. The bias is a
+//! slow random walk ([`bias`]), faster in motion. What was learned shortly before a contact is taken back ([`blocks`]),
+//! and nothing is learned during one.
 
 mod alarm;
 mod bias;
