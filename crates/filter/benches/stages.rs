@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 use divan::Bencher;
 use nalgebra::{Point3, Vector3};
 use palpate_filter::{Detector, DetectorParameters, Filter, Intake, Method, Parameters, Stage};
-use palpate_model::{Kinematics, LoadOptions, Robot, Surface, iiwa14};
+use palpate_model::{Dynamics, Kinematics, LoadOptions, Robot, Surface, iiwa14};
 use rayon::ThreadPoolBuilder;
 
 use stream::{Cloud, Stream};
@@ -164,6 +164,29 @@ fn a_thousand_samples_through_the_detector(bencher: Bencher) {
         for sample in &samples[..1000] {
             divan::black_box(detector.update(intake.admit(sample).unwrap()));
         }
+    });
+}
+
+/// The recursive Newton-Euler algorithm for the seven joints, once.
+#[divan::bench]
+fn inverse_dynamics(bencher: Bencher) {
+    let dynamics = Dynamics::new(robot(), Dynamics::UPRIGHT, None).unwrap();
+    let mut workspace = dynamics.workspace();
+    let joints: [f64; 7] = std::array::from_fn(|joint| 0.1 + 0.1 * joint as f64);
+    bencher.bench_local(move || {
+        let joints = divan::black_box(&joints);
+        dynamics.inverse_dynamics(&mut workspace, joints, joints, joints)[0]
+    });
+}
+
+/// The composite-rigid-body algorithm for them, once.
+#[divan::bench]
+fn mass_matrix(bencher: Bencher) {
+    let dynamics = Dynamics::new(robot(), Dynamics::UPRIGHT, None).unwrap();
+    let mut workspace = dynamics.workspace();
+    let joints: [f64; 7] = std::array::from_fn(|joint| 0.1 + 0.1 * joint as f64);
+    bencher.bench_local(move || {
+        dynamics.mass_matrix(&mut workspace, divan::black_box(&joints))[(0, 0)]
     });
 }
 
