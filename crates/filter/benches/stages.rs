@@ -152,7 +152,7 @@ fn a_thousand_projections_by_tree(bencher: Bencher) {
 #[divan::bench]
 fn kinematics(bencher: Bencher) {
     let mut kinematics = Kinematics::new(robot());
-    bencher.bench_local(|| kinematics.update(robot(), &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]));
+    bencher.bench_local(|| kinematics.update(robot(), &JOINTS));
 }
 
 #[divan::bench]
@@ -167,14 +167,19 @@ fn a_thousand_samples_through_the_detector(bencher: Bencher) {
     });
 }
 
+const JOINTS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
+
+fn dynamics() -> Dynamics {
+    Dynamics::new(robot(), Dynamics::UPRIGHT, None).unwrap()
+}
+
 /// The recursive Newton-Euler algorithm for the seven joints, once.
 #[divan::bench]
 fn inverse_dynamics(bencher: Bencher) {
-    let dynamics = Dynamics::new(robot(), Dynamics::UPRIGHT, None).unwrap();
+    let dynamics = dynamics();
     let mut workspace = dynamics.workspace();
-    let joints: [f64; 7] = std::array::from_fn(|joint| 0.1 + 0.1 * joint as f64);
     bencher.bench_local(move || {
-        let joints = divan::black_box(&joints);
+        let joints = divan::black_box(&JOINTS);
         dynamics.inverse_dynamics(&mut workspace, joints, joints, joints)[0]
     });
 }
@@ -182,11 +187,10 @@ fn inverse_dynamics(bencher: Bencher) {
 /// The composite-rigid-body algorithm for them, once.
 #[divan::bench]
 fn mass_matrix(bencher: Bencher) {
-    let dynamics = Dynamics::new(robot(), Dynamics::UPRIGHT, None).unwrap();
+    let dynamics = dynamics();
     let mut workspace = dynamics.workspace();
-    let joints: [f64; 7] = std::array::from_fn(|joint| 0.1 + 0.1 * joint as f64);
     bencher.bench_local(move || {
-        dynamics.mass_matrix(&mut workspace, divan::black_box(&joints))[(0, 0)]
+        dynamics.mass_matrix(&mut workspace, divan::black_box(&JOINTS))[(0, 0)]
     });
 }
 

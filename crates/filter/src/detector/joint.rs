@@ -72,11 +72,11 @@ pub(super) struct JointDetector {
     smoothed: [f64; CHARTS],
     /// By how much each was beyond its threshold with the last sample, in thresholds.
     last_ratio: [f64; CHARTS],
-    /// The same for the charts of sudden changes.
+    /// What turning back does to the charts of sudden changes.
     turns: Turns,
-    onset_limit: [f64; ONSETS],
     partial: Partial,
-    /// By how much each chart of sudden changes was beyond its threshold with the last sample, in thresholds.
+    /// The same limits and ratios for them.
+    onset_limit: [f64; ONSETS],
     onset_ratio: [f64; ONSETS],
     /// Standard deviation of a sample's residual, Nm.
     sample_std: f64,
@@ -250,7 +250,8 @@ impl JointDetector {
     }
 
     /// Learns from what was noted and forgets it; not if it was a contact without doubt, nor, of the slow charts, `off_turns`
-    /// once the noise is known. Jumps stand out, so that of them any short contact teaches, a little each.
+    /// once the noise is known. Jumps stand out, so that the charts of sudden changes learn from any short contact that may
+    /// have been a turn, a little each.
     pub(super) fn settle(&mut self, ended: Ended, motion_std: f64) {
         let doubt = std::mem::take(&mut self.doubt);
         let is_known = self.exposure.is_long();
