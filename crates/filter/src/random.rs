@@ -11,6 +11,7 @@ pub(crate) enum Purpose {
     Resample = 3,
     Fresh = 4,
     Hop = 5,
+    Facet = 6,
 }
 
 /// The random stream of one chunk of particles at one step.

@@ -27,6 +27,8 @@ pub(super) enum Phase {
     Screen,
     /// Climb from those, so many rounds, each with fewer of them.
     Scan(usize),
+    /// Climb on the mesh from contacts with the smooth body, so many rounds.
+    Facets(usize),
     /// Climb as bars from the best balls, so many rounds.
     Bars(usize),
     /// Climb as drifting obstacles from the best that rest, so many rounds.

@@ -94,6 +94,29 @@ impl PalpateFilter {
             keep_best_of_each(&mut self.bench.climbs, most);
             return self.agenda.enter(Phase::Scan(round + 1));
         }
+        self.agenda.enter(Phase::Facets(0));
+    }
+
+    /// After a scan, climbs on the mesh from about where the smooth body was touched.
+    pub(super) fn facets(&mut self, step: &Step, round: usize) {
+        let is_done = match round {
+            0 => {
+                let is_smooth = |peak: &&Peak| peak.obstacle.likeness.is_smooth();
+                let smooth: Vec<Peak> = self.bench.climbs.iter().filter(is_smooth).cloned().collect();
+                let start = |filter: &Self, index: usize, history: &History| {
+                    let mut random = stream(filter.seed, filter.key, index, Purpose::Facet);
+                    scan::faceted(history, &smooth[index], &mut random)
+                };
+                self.begin_climbs(step, smooth.len(), scan::FACET_COST, start)
+            }
+            _ => self.climb_on(step),
+        };
+        if !is_done {
+            return;
+        }
+        if round + 1 < scan::FACET_ROUNDS {
+            return self.agenda.enter(Phase::Facets(round + 1));
+        }
         self.renew_peaks();
         self.agenda.enter(Phase::Bars(0));
     }

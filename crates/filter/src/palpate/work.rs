@@ -70,6 +70,7 @@ impl PalpateFilter {
             Phase::Ask => self.ask(step),
             Phase::Screen => self.screen(step),
             Phase::Scan(round) => self.scan(step, round),
+            Phase::Facets(round) => self.facets(step, round),
             Phase::Bars(round) => self.bars(step, round),
             Phase::Drifts(round) => self.drifts(step, round),
             Phase::Sight => self.sight(step),
