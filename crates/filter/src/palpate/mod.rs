@@ -2,14 +2,15 @@
 //!
 //! A particle is an obstacle that rests in the world or drifts ([`obstacle`]); its weight is the evidence of the contact's
 //! whole history ([`memory`], [`evidence`]), with force, stiffness, friction and bias solved and the noise learned
-//! ([`noise`]). Peaks of the evidence are found by asking every triangle ([`scan`]) and climbing ([`search`]); Markov
-//! chain moves ([`moves`]) carry the particles between and around them, so that a wrong mode is left again. The work
-//! that a keyframe causes is spread over the samples until the next ([`agenda`]).
+//! ([`noise`]). Peaks of the evidence are found by asking every triangle ([`scan`]) and climbing ([`search`],
+//! [`facets`]); Markov chain moves ([`moves`]) carry the particles between and around them, so that a wrong mode is left
+//! again. The work that a keyframe causes is spread over the samples until the next ([`agenda`]).
 
 mod agenda;
 mod chart;
 mod crowd;
 mod evidence;
+mod facets;
 mod history;
 mod likeness;
 mod memory;

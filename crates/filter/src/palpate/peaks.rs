@@ -32,12 +32,12 @@ pub(super) struct Peak {
     pub(super) log_mass: f64,
     /// Whether the last step hardly moved it.
     pub(super) rests: bool,
-    chart: Chart,
+    pub(super) chart: Chart,
     precision: Square,
     /// Log of the volume of its Gaussian.
     log_volume: f64,
     /// Lower Cholesky factor of the covariance.
-    root: Square,
+    pub(super) root: Square,
     /// Covariance of the contact point from systematic errors, m², in the link's frame, once it was
     /// looked at.
     pub(super) sight: Option<Matrix3<f64>>,
@@ -182,7 +182,7 @@ impl Peak {
     }
 
     /// Obstacle, evidence and log posterior in the chart's measure at x.
-    fn try_at(&self, x: &Coordinates, history: &History) -> (Obstacle, Evidence, f64) {
+    pub(super) fn try_at(&self, x: &Coordinates, history: &History) -> (Obstacle, Evidence, f64) {
         let mut obstacle = self.at(x, history);
         let evidence = history.evidence(&mut obstacle);
         let log_prior = log_radius_prior(self.chart.radius(x)) + obstacle.core.log_drift_prior();

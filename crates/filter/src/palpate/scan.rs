@@ -29,11 +29,6 @@ pub(super) const SCREENING: usize = RADII.len() * (1 + DIRECTIONS) / 2;
 pub(super) const MOST_LEFT: [usize; 8] = [20, 20, 12, 12, 8, 8, 8, 8];
 /// Rounds of the bars' climbs.
 pub(super) const BAR_ROUNDS: usize = 8;
-/// Places around a contact with the smooth body that the mesh is asked at, and the rounds of the climbs from there.
-const FACETS: usize = 24;
-pub(super) const FACET_ROUNDS: usize = 4;
-/// What it costs to begin one of them, in evaluations.
-pub(super) const FACET_COST: usize = FACETS + 17;
 /// Ball peaks that bars are tried in the place of.
 pub(super) const BARS: usize = 8;
 /// What it costs to begin a climb as a bar, in evaluations.
@@ -199,18 +194,6 @@ pub(super) fn start(history: &History, candidate: &Candidate) -> Peak {
 pub(super) fn bar(history: &History, ball: &Peak) -> Peak {
     let start = |&turn: &Option<f64>| history.reshaped(&ball.obstacle, turn);
     best(TURNS[1..].iter().map(start), history)
-}
-
-/// Where a climb on the mesh from a contact with the smooth body begins: triangles make many small peaks of a wide one.
-pub(super) fn faceted(history: &History, smooth: &Peak, random: &mut impl Rng) -> Peak {
-    let mesh = |core| Obstacle {
-        likeness: Likeness::Mesh,
-        core,
-        ..smooth.obstacle
-    };
-    let around = (0..FACETS).map(|_| mesh(smooth.draw(history, random)));
-    let own = std::iter::once(mesh(smooth.obstacle.core));
-    best(own.chain(around), history)
 }
 
 /// How a ball, and then how bars are turned about the normal, rad.

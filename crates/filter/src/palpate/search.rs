@@ -4,7 +4,9 @@ use rand::RngExt;
 use rayon::prelude::*;
 
 use super::agenda::Phase;
+use super::facets::SCATTERED;
 use super::history::History;
+use super::likeness::Likeness;
 use super::obstacle::Obstacle;
 use super::peaks::{MOST, Peak, keep_best, keep_best_of_each, keep_likely, step_cost};
 use super::scan::{self, Candidate};
@@ -19,17 +21,17 @@ const HOP_ROUNDS: usize = 3;
 const FAR_HOPS_FROM: usize = 4;
 /// the others beside so many best peaks, and then at particles.
 const HOPS_FROM_PEAKS: usize = 6;
+/// What looking around on the mesh costs, spread over all hops, in evaluations.
+const SCATTERING: usize = SCATTERED * HOPS_FROM_PEAKS / (2 * HOPS);
 /// What asking a link's triangles costs, in looks at a keyframe: about what a sample of 1 kHz pays for.
 const ASKING: usize = 1000;
 
 impl PalpateFilter {
     /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks and from particles.
     pub(super) fn hop(&mut self, step: &Step, round: usize) {
-        let start = |filter: &Self, index, history: &History| {
-            Peak::new(filter.hop_start(index, history), history)
-        };
+        let start = |filter: &Self, index, history: &History| filter.hop_start(index, history);
         let is_done = match round {
-            0 => self.begin_climbs(step, HOPS, step_cost(&self.peaks), start),
+            0 => self.begin_climbs(step, HOPS, step_cost(&self.peaks) + SCATTERING, start),
             _ => self.climb_on(step),
         };
         if !is_done {
@@ -94,31 +96,12 @@ impl PalpateFilter {
             keep_best_of_each(&mut self.bench.climbs, most);
             return self.agenda.enter(Phase::Scan(round + 1));
         }
+        let is_smooth = |peak: &&Peak| peak.obstacle.likeness.is_smooth();
+        let smooth = self.bench.climbs.iter().filter(is_smooth);
+        let smooth: Vec<Peak> = smooth.cloned().collect();
+        self.peaks.append(&mut self.bench.climbs);
+        self.bench.climbs = smooth;
         self.agenda.enter(Phase::Facets(0));
-    }
-
-    /// After a scan, climbs on the mesh from about where the smooth body was touched.
-    pub(super) fn facets(&mut self, step: &Step, round: usize) {
-        let is_done = match round {
-            0 => {
-                let is_smooth = |peak: &&Peak| peak.obstacle.likeness.is_smooth();
-                let smooth: Vec<Peak> = self.bench.climbs.iter().filter(is_smooth).cloned().collect();
-                let start = |filter: &Self, index: usize, history: &History| {
-                    let mut random = stream(filter.seed, filter.key, index, Purpose::Facet);
-                    scan::faceted(history, &smooth[index], &mut random)
-                };
-                self.begin_climbs(step, smooth.len(), scan::FACET_COST, start)
-            }
-            _ => self.climb_on(step),
-        };
-        if !is_done {
-            return;
-        }
-        if round + 1 < scan::FACET_ROUNDS {
-            return self.agenda.enter(Phase::Facets(round + 1));
-        }
-        self.renew_peaks();
-        self.agenda.enter(Phase::Bars(0));
     }
 
     /// After a scan, climbs as bars from where the best peaks are.
@@ -188,7 +171,7 @@ impl PalpateFilter {
     }
 
     /// A portion of a round in which all climbs go one step on. Tells whether the round is done.
-    fn climb_on(&mut self, step: &Step) -> bool {
+    pub(super) fn climb_on(&mut self, step: &Step) -> bool {
         let total = self.bench.climbs.len();
         let portion = self.portion(total, step_cost(&self.bench.climbs));
         let history = history(step, &self.memory, &self.noise);
@@ -200,23 +183,25 @@ impl PalpateFilter {
     }
 
     /// Beside a peak, or a particle, seen as a ball or a bar.
-    fn hop_start(&self, index: usize, history: &History) -> Obstacle {
+    fn hop_start(&self, index: usize, history: &History) -> Peak {
         let mut random = stream(self.seed, self.key, index, Purpose::Hop);
         if index.is_multiple_of(2) && !self.peaks.is_empty() {
             let among = self.peaks.len().min(FAR_HOPS_FROM);
             let peak = &self.peaks[random.random_range(0..among)];
-            return history.elsewhere(&peak.obstacle, &mut random);
+            return Peak::new(history.elsewhere(&peak.obstacle, &mut random), history);
         }
         let index = index / 2;
-        match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
+        let obstacle = match self.peaks.get(index).filter(|_| index < HOPS_FROM_PEAKS) {
             Some(peak) => {
-                let own = peak.obstacle.likeness;
+                let likeness = Likeness::draw(&mut random);
+                if !likeness.is_smooth() {
+                    let mut start = peak.clone();
+                    start.scatter(history, &mut random);
+                    return start;
+                }
                 Obstacle {
                     core: peak.draw(history, &mut random),
-                    likeness: match random.random::<bool>() {
-                        true => own.other(&mut random),
-                        false => own,
-                    },
+                    likeness,
                     ..peak.obstacle
                 }
             }
@@ -225,11 +210,12 @@ impl PalpateFilter {
                 let turn = std::f64::consts::PI * random.random::<f64>();
                 history.reshaped(&particle.obstacle, random.random::<bool>().then_some(turn))
             }
-        }
+        };
+        Peak::new(obstacle, history)
     }
 
     /// The climbs that came to their end are peaks like the others.
-    fn renew_peaks(&mut self) {
+    pub(super) fn renew_peaks(&mut self) {
         self.peaks.append(&mut self.bench.climbs);
         keep_best(&mut self.peaks, MOST);
         keep_likely(&mut self.peaks);
