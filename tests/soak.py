@@ -112,6 +112,12 @@ def most(told, key):
     return max((float(values[key]) for values in told if values.get(key, "none") != "none"), default=float("nan"))
 
 
+def particles(told):
+    """Fewest and most that the node allowed itself, as told each second in which samples came."""
+    counts = [int(values["particles"]) for values in told if float(values.get("samples used, Hz", 0.0)) > 0.0]
+    return min(counts, default=0), max(counts, default=0)
+
+
 def soak(options, folder):
     scenario = folder / "scenario.yaml"
     scenario.write_text(SCENARIO % options.rate)
@@ -157,6 +163,7 @@ def report(count, took, processor, memory, latency, told, last):
         ("sample to listener, p50 · p99 · max, ms", " · ".join(milliseconds(latency[at]) for at in ("p50_ms", "p99_ms", "max_ms"))),
         ("… of so many contact poses", f"{latency['count']}"),
         ("step, largest p50 · p99 · max of a second, ms", " · ".join(f"{most(told, f'step {at}, ms'):.3f}" for at in ("p50", "p99", "max"))),
+        ("particles, fewest · most", " · ".join(str(at) for at in particles(told))),
         ("memory at start · middle · end, MB", " · ".join(f"{at:.1f}" for at in (memory[0], memory[len(memory) // 2], memory[-1]))),
         ("share of one core", f"{100 * processor:.0f} %"),
     ]  # fmt: skip

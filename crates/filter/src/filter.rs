@@ -76,6 +76,14 @@ impl Estimator {
         }
     }
 
+    /// Particles that the last step moved and weighed.
+    fn moved(&self) -> usize {
+        match self {
+            Self::Paper(filter) => filter.moved(),
+            Self::Palpate { .. } => 0,
+        }
+    }
+
     fn widen(&self, step: &Step, modes: &mut [Mode]) {
         if let Self::Palpate { filter, .. } = self {
             filter.widen(step, modes);
@@ -107,6 +115,8 @@ pub struct Filter {
     position_before: Vec<f64>,
     number: u64,
     seed: u64,
+    /// Most particles of the paper's filter, besides its parameter.
+    limit: usize,
     /// The particles, once somebody asked for them.
     shown: OnceLock<Vec<Particle>>,
     estimate: ContactEstimate,
@@ -138,6 +148,7 @@ impl Filter {
             position_before: vec![0.0; robot.dof()],
             number: 0,
             seed,
+            limit: usize::MAX,
             shown: OnceLock::new(),
             estimate: ContactEstimate {
                 stamp_ns: 0,
@@ -179,6 +190,7 @@ impl Filter {
                 torque: &self.torque,
                 bias: self.detector.bias(),
                 number: self.number,
+                limit: self.limit,
             };
             let cloud = self.estimator.step(&step, sample.stamp_ns);
             self.modes
@@ -204,6 +216,7 @@ impl Filter {
             torque: &self.torque,
             bias: self.detector.bias(),
             number: self.number,
+            limit: self.limit,
         };
         let Estimator::Paper(filter) = &mut self.estimator else {
             return;
@@ -233,6 +246,30 @@ impl Filter {
             (true, false) => ContactStatus::Ambiguous,
             (true, true) => ContactStatus::Located,
         };
+    }
+
+    /// Lets the paper's filter have at most so many particles (at least one) from the next step on, for a machine that is
+    /// too slow for as many as [`Parameters::particles`]. They become fewer with that step, and more again, where this
+    /// allows twice as many, or when they are resampled anyhow. Without a call, the number is the parameter's.
+    pub fn limit_particles(&mut self, count: usize) {
+        self.limit = count.max(1);
+    }
+
+    /// Most particles, or hypotheses, that there may be now.
+    pub fn most_particles(&self) -> usize {
+        let count = self.parameters.particle_count();
+        match self.parameters.method {
+            Method::Paper => count.min(self.limit),
+            Method::Palpate => count,
+        }
+    }
+
+    /// How many particles of the paper's filter the last update moved and weighed; 0 where it made no step.
+    pub fn moved_particles(&self) -> usize {
+        match self.estimate.status {
+            ContactStatus::NoContact => 0,
+            _ => self.estimator.moved(),
+        }
     }
 
     fn take_bias_out(&mut self, external_torque: &[f64]) {
@@ -291,6 +328,11 @@ impl Filter {
     /// The bias of each joint's external torque, tared or learned.
     pub fn bias(&self) -> &[JointBias] {
         self.detector.bias()
+    }
+
+    /// The parameters.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
     }
 
     /// Whether anything touched at the last update, and what the torques tell of it without the estimate.

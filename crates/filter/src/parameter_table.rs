@@ -67,6 +67,7 @@ pub const PARAMETER_TABLE: &[ParameterRow] = &[
     row("torque.observer.gain", "1/s", "> 0, at most 1000", Some([0.0, 1000.0]), false, "gain of the momentum observer, for all joints or for each; its bandwidth is gain/2π Hz"),
     row("filter.method", "", "`palpate`, `paper`", None, true, "the method"),
     row("filter.particles", "", "100 to 10⁷", Some([100.0, 1e7]), true, "number of particles of `paper`"),
+    row("filter.min_particles", "", "100 to 10⁷", Some([100.0, 1e7]), true, "fewest that the node goes down to where steps take too long; from `filter.particles` on: none fewer"),
     row("filter.located_probability", "", "0 to 1", Some([0.0, 1.0]), true, "least probability of a located contact's first mode"),
     row("filter.located_std", "m", "> 0", Some([0.0, f64::MAX]), true, "largest standard deviation of a located contact's first mode"),
     row("filter.tolerance", "m", "0 to 0.1", Some([0.0, 0.1]), true, "error of meshes and positions, added to every estimate's"),

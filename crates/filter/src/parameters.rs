@@ -25,6 +25,9 @@ pub struct Parameters {
     pub method: Method,
     /// Number of particles of the paper's filter. Default 10,000.
     pub particles: usize,
+    /// The node takes fewer where its machine is too slow for the samples, down to this many; see
+    /// [`Filter::limit_particles`](crate::Filter::limit_particles). Where `particles` is less, that counts. Default 1000.
+    pub min_particles: usize,
     /// A contact counts as located when its first mode has at least this probability. Default 0.6.
     pub located_probability: f64,
     /// … and at most this standard deviation of the position, m. Default 0.03.
@@ -44,6 +47,7 @@ impl Default for Parameters {
         Self {
             method: Method::Palpate,
             particles: 10_000,
+            min_particles: 1000,
             located_probability: 0.6,
             located_std: 0.03,
             tolerance: 0.001,
@@ -63,19 +67,25 @@ impl Parameters {
         }
     }
 
+    /// Fewest and most particles that the node lets the paper's filter have.
+    pub fn particle_range(&self) -> [usize; 2] {
+        [self.min_particles.min(self.particles), self.particles]
+    }
+
     /// Checks every range.
     ///
     /// # Errors
     /// Names the parameter, what is allowed and what was found.
     pub fn check(&self) -> Result<(), ParameterError> {
         let check = ParameterError::check;
-        let count = self.particles as f64;
-        check(
-            "filter.particles",
-            "100 … 10,000,000",
-            count,
-            (100.0..=1e7).contains(&count),
-        )?;
+        for (name, count) in [
+            ("filter.particles", self.particles),
+            ("filter.min_particles", self.min_particles),
+        ] {
+            let count = count as f64;
+            let fits = (100.0..=1e7).contains(&count);
+            check(name, "100 … 10,000,000", count, fits)?;
+        }
         let probability = (0.0..=1.0).contains(&self.located_probability);
         check(
             "filter.located_probability",

@@ -25,6 +25,8 @@ pub(crate) struct Step<'a> {
     pub(crate) bias: &'a [JointBias],
     /// Number of the sample since the filter began; keys the random streams.
     pub(crate) number: u64,
+    /// Most particles that the paper's filter may have from this step on.
+    pub(crate) limit: usize,
 }
 
 impl Step<'_> {

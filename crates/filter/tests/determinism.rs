@@ -24,10 +24,14 @@ fn samples(robot: &Robot) -> Vec<JointSample> {
     samples
 }
 
+/// Most particles, one part of the samples after the other.
+const LIMITS: [usize; 4] = [usize::MAX, usize::MAX, 300, 1500];
+
 /// All that a filter says, as text that tells every bit of every number.
 fn told(filter: &mut Filter, samples: &[JointSample]) -> String {
     let mut text = String::new();
-    for part in samples.chunks(10) {
+    for (part, &limit) in samples.chunks(10).zip(LIMITS.iter().cycle()) {
+        filter.limit_particles(limit);
         text += &format!("{:?}\n{:?}\n", play(filter, part), filter.particles());
     }
     text

@@ -41,10 +41,14 @@ fn parameters(rate_hz: f64) -> Parameters {
     parameters
 }
 
-/// Feeds samples; tells how many had a contact.
+/// Feeds samples, with another limit on the particles for each; tells how many had a contact.
 fn feed(filter: &mut Filter, intake: &mut Intake, samples: &[JointSample]) -> usize {
     let mut in_contact = 0;
-    for sample in samples {
+    for (sample, limit) in samples
+        .iter()
+        .zip([2000, 1000, 300, 700].into_iter().cycle())
+    {
+        filter.limit_particles(limit);
         let status = filter.update(intake.admit(sample).unwrap()).status;
         in_contact += usize::from(status != ContactStatus::NoContact);
     }

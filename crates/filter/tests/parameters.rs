@@ -22,6 +22,12 @@ const CASES: &[Case] = &[
         &[0.0, 99.0, 10_000_001.0],
     ),
     (
+        "min_particles",
+        "100",
+        |p, v| p.min_particles = v as usize,
+        &[0.0, 99.0, 10_000_001.0],
+    ),
+    (
         "located_probability",
         "0 … 1",
         |p, v| p.located_probability = v,

@@ -211,7 +211,7 @@ fn figures(settings: &Settings, progress: &Progress) -> [KeyValue; 10] {
         pair("step p50, ms", quantile_ms(&progress.steps, 0.50)),
         pair("step p99, ms", quantile_ms(&progress.steps, 0.99)),
         pair("step max, ms", quantile_ms(&progress.steps, 1.0)),
-        pair("particles", settings.filter.particle_count()),
+        pair("particles", progress.particles),
         pair(
             "effective sample size",
             format!("{:.1}", progress.effective_sample_size),

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use palpate_filter::{ContactEstimate, ContactPose, Filter, Intake, IntakeCounts, TareState};
 use palpate_model::{JointSample, Kinematics, Robot};
-use palpate_node::{Newest, Throttle, TimedSample};
+use palpate_node::{Newest, Pacing, Throttle, TimedSample};
 use r2r::Publisher;
 use r2r::geometry_msgs::msg::{PoseWithCovarianceStamped, WrenchStamped};
 use r2r::sensor_msgs::msg::JointState;
@@ -40,6 +40,8 @@ pub struct Progress {
     pub last_stamp_ns: Option<i64>,
     /// Stamp of the sample with which the last tare was done.
     pub tared_ns: Option<i64>,
+    /// Most particles, or hypotheses, that there may be now.
+    pub particles: usize,
     pub effective_sample_size: f64,
     /// Standard deviation of the particles' points, m.
     pub spread: f64,
@@ -52,6 +54,7 @@ pub struct Estimation {
     robot: Arc<Robot>,
     filter: Filter,
     intake: Intake,
+    pacing: Pacing,
     outputs: Outputs,
     easel: Arc<Easel>,
     progress: Arc<Mutex<Progress>>,
@@ -73,6 +76,7 @@ impl Estimation {
     ) -> Self {
         Self {
             intake: Intake::new(robot.dof()),
+            pacing: Pacing::new(filter.parameters().particle_range()),
             robot,
             filter,
             outputs,
@@ -104,7 +108,7 @@ impl Estimation {
             if let Some(timed) = samples.pop_within(PATIENCE) {
                 self.follow_time(&timed);
                 if self.enabled {
-                    self.take(&timed.sample)?;
+                    self.take(&timed.sample, samples.len())?;
                 }
             }
             self.watch_tare();
@@ -150,6 +154,7 @@ impl Estimation {
             }
             Order::Parameters(parameters) => match self.filter.set_parameters(&parameters) {
                 Ok(()) => {
+                    self.pacing = Pacing::new(self.filter.parameters().particle_range());
                     self.tell_detected(self.filter.estimate().best().is_some())?;
                     Outcome::done("parameters changed")
                 }
@@ -211,14 +216,19 @@ impl Estimation {
         words.collect::<Vec<_>>().join(", ")
     }
 
-    fn take(&mut self, sample: &JointSample) -> r2r::Result<()> {
+    /// Takes a sample, for which so many others are `waiting`.
+    fn take(&mut self, sample: &JointSample, waiting: usize) -> r2r::Result<()> {
         let begin = Instant::now();
         match self.intake.admit(sample) {
             Ok(admitted) => {
+                self.filter.limit_particles(self.pacing.particles());
                 let estimate = self.filter.update(admitted).clone();
                 let step = begin.elapsed();
                 self.publish(&estimate)?;
                 self.publish_details(&estimate)?;
+                self.pacing.see_sample(sample.stamp_ns);
+                let moved = self.filter.moved_particles();
+                (self.pacing).see_step(moved, begin.elapsed(), waiting);
                 self.note(&estimate, step);
                 if self.easel.is_waiting() {
                     self.draw(sample, estimate);
@@ -307,6 +317,7 @@ impl Estimation {
         progress.intake = self.intake.counts();
         progress.status = estimate.status.word();
         progress.last_stamp_ns = Some(estimate.stamp_ns);
+        progress.particles = self.filter.most_particles();
         if let Some(figures) = figures {
             (progress.effective_sample_size, progress.spread) = figures;
         }

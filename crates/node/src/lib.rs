@@ -7,6 +7,7 @@ mod measured_input;
 #[cfg(feature = "ros2")]
 pub mod messages;
 mod newest;
+mod pacing;
 mod parameter_names;
 #[cfg(feature = "ros2")]
 pub mod process;
@@ -17,6 +18,7 @@ mod untyped;
 pub use health::{Health, Level, Losses, Rates, judge};
 pub use joint_input::{Delays, JointInput, MessageCounts, MessageError, TimedSample, nanoseconds};
 pub use newest::Newest;
+pub use pacing::Pacing;
 pub use parameter_names::{as_listed, within_prefixes};
 pub use throttle::Throttle;
 pub use untyped::Untyped;

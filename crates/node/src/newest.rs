@@ -103,6 +103,11 @@ impl<T> Newest<T> {
         self.lock().waiting.is_empty()
     }
 
+    /// How many entries wait.
+    pub fn len(&self) -> usize {
+        self.lock().waiting.len()
+    }
+
     /// How many entries were lost so far.
     pub fn lost(&self) -> u64 {
         self.lock().lost

@@ -47,6 +47,8 @@ pub(crate) struct PaperFilter {
     /// How far the joints have moved since contact began, rad or m.
     travelled: f64,
     window: Window,
+    /// Particles that the last sample moved; none where it made no step.
+    moved: usize,
     processor: Arch,
 }
 
@@ -66,6 +68,7 @@ impl PaperFilter {
             motions: vec![LinkMotion::default(); links],
             travelled: 0.0,
             window: Window::new(robot),
+            moved: 0,
             processor: Arch::new(),
         }
     }
@@ -86,6 +89,7 @@ impl PaperFilter {
     /// Takes a sample in, and makes a step by the mean of the samples since the last one when it is time.
     pub(crate) fn step(&mut self, sample: &Step, stamp_ns: i64) {
         self.window.add(stamp_ns, sample.position, sample.torque);
+        self.moved = 0;
         if !self.cloud.is_empty() && !self.window.is_full(self.parameters.rate_hz) {
             return;
         }
@@ -101,16 +105,32 @@ impl PaperFilter {
         self.travelled += step.joint_motion();
         let level = Level::at(&self.parameters, self.travelled);
         self.condition(step);
+        let most = self.count.min(step.limit);
         if self.cloud.is_empty() {
-            self.renew(step, self.count);
+            self.renew(step, [0, most]);
         }
+        self.moved = self.cloud.len();
         self.propagate_and_reweight(step, &level);
         self.weights.normalise(&mut self.cloud);
-        if self.weights.effective_sample_size() < self.parameters.resample_below * self.count as f64
-        {
-            let fresh = self.parameters.fresh_share * self.count as f64;
-            self.renew(step, fresh.round() as usize);
+        let least = self.parameters.resample_below * self.moved as f64;
+        let is_poor = self.weights.effective_sample_size() < least;
+        // So few that it is worth a resampling, or too many.
+        let misfits = self.moved < most / 2 || self.moved > most;
+        if is_poor || misfits {
+            self.resample(step);
         }
+    }
+
+    /// Particles that the last sample moved and weighed.
+    pub(crate) fn moved(&self) -> usize {
+        self.moved
+    }
+
+    /// Makes a new generation of as many as there may be, some of them fresh.
+    fn resample(&mut self, step: &Step) {
+        let most = self.count.min(step.limit);
+        let fresh = (self.parameters.fresh_share * most as f64).round() as usize;
+        self.renew(step, [most - fresh, fresh]);
     }
 
     /// Conditions the models on this sample: what all particles of a link share.
@@ -145,8 +165,8 @@ impl PaperFilter {
             });
     }
 
-    /// Makes a new generation with so many fresh particles; all weigh the same.
-    fn renew(&mut self, step: &Step, fresh: usize) {
+    /// Makes a new generation of so many children and so many fresh particles; all weigh the same.
+    fn renew(&mut self, step: &Step, counts: [usize; 2]) {
         let nursery = Nursery {
             skin: step.skin,
             likelihoods: &self.likelihoods,
@@ -154,10 +174,9 @@ impl PaperFilter {
             seed: self.seed,
             number: step.number,
         };
-        let counts = [self.count - fresh, fresh];
         (self.generation).fill(&self.cloud, &mut self.offspring, counts, &nursery);
         std::mem::swap(&mut self.cloud, &mut self.offspring);
-        self.weights.equal();
+        self.weights.renew(&self.cloud);
     }
 
     /// The particles, with their weights.

@@ -65,10 +65,7 @@ impl PaperFilter {
             }
             Stage::PropagateAndReweight => self.propagate_and_reweight(step, &level),
             Stage::Normalise => self.weights.normalise(&mut self.cloud),
-            Stage::Resample => {
-                let fresh = self.parameters.fresh_share * self.count as f64;
-                self.renew(step, fresh.round() as usize);
-            }
+            Stage::Resample => self.resample(step),
             Stage::Modes => {}
         }
     }

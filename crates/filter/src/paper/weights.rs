@@ -96,8 +96,10 @@ impl Weights {
         self.effective_sample_size
     }
 
-    /// All weights are equal, all log weights zero.
-    pub(super) fn equal(&mut self) {
+    /// Those of a new generation: all are equal, all log weights zero.
+    pub(super) fn renew(&mut self, cloud: &Cloud) {
+        self.blocks
+            .resize_with(cloud.blocks.len(), BlockWeights::default);
         self.largest = 0.0;
     }
 
