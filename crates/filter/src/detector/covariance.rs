@@ -1,6 +1,8 @@
 //! How noise is correlated between joints, and what of a joint's reading those beyond it do not explain.
 
-/// Cells that what is believed before is worth, and its standard deviation, Nm.
+use super::scale::Scale;
+
+/// Cells that what is believed before is worth, and its standard deviation, Nm where there is little inertia.
 const FIRST_CELLS: f64 = 20.0;
 const FIRST_STD: f64 = 0.05;
 /// Variance of a partial residual, at least, Nm².
@@ -12,11 +14,15 @@ pub(super) const CLIP: f64 = 4.0;
 #[derive(Clone, Debug)]
 pub(super) struct Covariance {
     pub(super) dof: usize,
-    /// Readings of the joints, Nm, and their covariance, Nm², row by row.
+    /// Readings of the joints, Nm.
     pub(super) reading: Vec<f64>,
+    /// The same by [`Scale`], and the covariance thereof, row by row.
+    scaled: Vec<f64>,
+    entries: Vec<f64>,
+    /// Variances of the readings, Nm², without what was told beside.
+    pub(super) noise: Vec<f64>,
     /// Partial residuals, Nm.
     pub(super) partial: Vec<f64>,
-    entries: Vec<f64>,
     /// U above the diagonal and D in it, of its factorisation U D Uᵀ.
     pub(super) factor: Vec<f64>,
     /// Cells that were learned from.
@@ -28,8 +34,10 @@ impl Covariance {
         let mut covariance = Self {
             dof,
             reading: vec![0.0; dof],
-            partial: vec![0.0; dof],
+            scaled: vec![0.0; dof],
             entries: vec![0.0; dof * dof],
+            noise: vec![0.0; dof],
+            partial: vec![0.0; dof],
             factor: vec![0.0; dof * dof],
             seen: 0.0,
         };
@@ -43,34 +51,37 @@ impl Covariance {
         for joint in 0..self.dof {
             self.entries[joint * self.dof + joint] = FIRST_STD * FIRST_STD;
         }
-        self.factorise(|_, _| 0.0);
+        self.factor.copy_from_slice(&self.entries);
     }
 
     /// Learns from the reading, in which nothing touches.
-    pub(super) fn learn(&mut self, trust: f64, lasting: f64) {
+    pub(super) fn learn(&mut self, scale: &Scale, trust: f64, lasting: f64) {
+        self.scaled.copy_from_slice(&self.reading);
+        scale.divide(&mut self.scaled);
         let variances = self.entries.iter().step_by(self.dof + 1);
-        let beyond = (self.reading.iter().zip(variances))
+        let beyond = (self.scaled.iter().zip(variances))
             .map(|(reading, variance)| {
                 reading * reading / (CLIP * CLIP * variance.max(LEAST_VARIANCE))
             })
             .fold(1.0, f64::max);
         self.seen += 1.0;
         let gain = trust / lasting.min(self.seen + FIRST_CELLS);
-        let rows = self.entries.chunks_exact_mut(self.dof).zip(&self.reading);
+        let rows = self.entries.chunks_exact_mut(self.dof).zip(&self.scaled);
         for (row, reading) in rows {
-            for (entry, other) in row.iter_mut().zip(&self.reading) {
+            for (entry, other) in row.iter_mut().zip(&self.scaled) {
                 *entry += gain * (reading * other / beyond - *entry);
             }
         }
     }
 
-    /// Factorises the covariance with what `beyond` tells for a joint and its variance in its diagonal, Nm².
-    pub(super) fn factorise(&mut self, beyond: impl Fn(usize, f64) -> f64) {
+    /// Factorises the covariance with what `beyond` tells for a joint in its diagonal, Nm².
+    pub(super) fn factorise(&mut self, scale: &mut Scale, beyond: impl Fn(usize) -> f64) {
         let n = self.dof;
-        self.factor.copy_from_slice(&self.entries);
+        scale.multiply(&self.entries, &mut self.factor);
         for joint in 0..n {
             let variance = &mut self.factor[joint * (n + 1)];
-            *variance += beyond(joint, *variance);
+            self.noise[joint] = *variance;
+            *variance += beyond(joint);
         }
         for joint in (0..n).rev() {
             let pivot = self.factor[joint * n + joint].max(LEAST_VARIANCE);

@@ -16,6 +16,8 @@ const CLIP: f64 = 6.0;
 /// Below so many standard deviations of the chart there is no sign of a contact.
 const CALM: f64 = 2.0;
 
+/// Share of a squared limit that is beyond what noise reaches amid turns.
+const JUMP_SHARE: f64 = 0.5;
 /// A joint that turns by less does not explain what its charts read, 0 to 1.
 pub(super) const DOUBTFUL_TURN: f64 = 0.3;
 
@@ -73,7 +75,7 @@ pub(super) struct JointDetector {
     /// By how much each was beyond its threshold with the last sample, in thresholds.
     last_ratio: [f64; CHARTS],
     /// What turning back does to the charts of sudden changes.
-    turns: Turns,
+    pub(super) turns: Turns,
     partial: Partial,
     /// The same limits and ratios for them.
     onset_limit: [f64; ONSETS],
@@ -108,7 +110,7 @@ impl JointDetector {
             limit: [0.0; CHARTS],
             smoothed: [0.0; CHARTS],
             last_ratio: [0.0; CHARTS],
-            turns: Turns::new(),
+            turns: Turns::default(),
             onset_limit: [f64::INFINITY; ONSETS],
             partial: Partial::default(),
             onset_ratio: [0.0; ONSETS],
@@ -137,11 +139,6 @@ impl JointDetector {
     /// The last sample's torque, as far as it is believed, Nm.
     pub(super) fn torque(&self) -> f64 {
         self.bias.mean + self.residual
-    }
-
-    /// What turning back adds to the variance of a sudden change, Nm².
-    pub(super) fn jump(&self, chart: usize, turning: Turning, variance: f64) -> f64 {
-        self.turns.at(chart, turning.narrow, variance)
     }
 
     /// Puts a sample's torque, Nm, on the charts.
@@ -232,7 +229,7 @@ impl JointDetector {
     /// Adds the last sample to what was seen.
     pub(super) fn see(&self, seen: &mut Seen, step_secs: f64, x2: f64, turning: Turning) {
         (seen.smoothed).add(step_secs, x2, turning.wide, self.smoothed);
-        (seen.onset).add(step_secs, turning.narrow, self.partial.rise);
+        (seen.onset).add(step_secs, turning.narrow, self.partial.excess);
     }
 
     /// Learns the noise from what was seen without contact.
@@ -244,9 +241,10 @@ impl JointDetector {
     /// Notes what a contact looks like, for it may turn out to be none. No more counts than what begins a contact.
     pub(super) fn doubt(&mut self, step_secs: f64, x2: f64, turning: Turning) {
         let smoothed = at_most(self.smoothed, self.limit);
-        let partial = at_most(self.partial.rise, self.onset_limit);
+        let squares = self.onset_limit.map(|limit| JUMP_SHARE * limit * limit);
+        let excess = at_most(self.partial.excess, squares);
         (self.doubt.smoothed).add(step_secs, x2, turning.wide, smoothed);
-        (self.doubt.onset).add(step_secs, turning.narrow, partial);
+        (self.doubt.onset).add(step_secs, turning.narrow, excess);
     }
 
     /// Learns from what was noted and forgets it; not if it was a contact without doubt, nor, of the slow charts, `off_turns`

@@ -21,6 +21,7 @@ mod noise;
 mod onset;
 mod parameters;
 mod reach;
+mod scale;
 mod turns;
 
 use palpate_model::{JointSample, Robot};
@@ -35,6 +36,7 @@ use motion::Motion;
 use onset::Onset;
 pub use parameters::DetectorParameters;
 use reach::Reach;
+use turns::Turns;
 
 /// After so long without sample the smoothed residuals begin anew, s.
 const GAP_SECS: f64 = 0.5;
@@ -87,7 +89,7 @@ impl Detector {
         Ok(Self {
             joints: vec![joint; dof],
             charts: Charts::default(),
-            onset: Onset::new(dof),
+            onset: Onset::new(robot),
             motion: Motion::new(dof),
             blocks: Blocks::new(dof),
             begin_ns: None,
@@ -169,10 +171,11 @@ impl Detector {
         }
         let torques = self.joints.iter().map(JointDetector::torque);
         let (joints, turning) = (&self.joints, self.motion.turning());
-        let jump = |joint: usize, chart: usize, variance| {
-            joints[joint].jump(chart, turning[joint], variance)
+        let pooled = Turns::pooled(joints.iter().map(|joint| &joint.turns));
+        let jump = |joint: usize, chart: usize| {
+            (joints[joint].turns).at(chart, turning[joint].narrow, &pooled)
         };
-        self.onset.look(torques, step_secs, jump);
+        self.onset.look(position, torques, step_secs, jump);
         let found = self.motion.turning().iter().zip(self.onset.partials());
         for (joint, (&turning, partial)) in self.joints.iter_mut().zip(found) {
             joint.weigh(stamp_ns, turning, &self.charts, partial, &weighing);

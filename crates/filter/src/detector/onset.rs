@@ -4,14 +4,19 @@
 //! noise. Noise is correlated between joints: that of the speeds reaches the external torque multiplied by the mass matrix,
 //! and a mass that is wrong acts on many joints. So the joints beyond tell much of a joint's noise, and its *partial
 //! residual*, what is left of its torque given theirs, has less of it (the innovations of the covariance's factorisation
-//! U D Uᵀ, from the last joint to the first). The covariance is learned within seconds, as the mass matrix changes.
+//! U D Uᵀ, from the last joint to the first). How the mass matrix changes is known ([`scale`](super::scale)); the rest of
+//! the covariance is learned within seconds.
 //!
 //! Charted is the mean of a short time, in which later torques weigh more as a push grows through the observer's filter,
 //! less the mean of a longer time before. This needs no bias to be known: what changes slowly, the torque of a wrong payload
 //! in motion for one, is no contact.
 
+use palpate_model::Robot;
+
 use super::cells::{Cells, ramp_variance};
 use super::covariance::{CLIP, Covariance, LEAST_VARIANCE};
+use super::scale::Scale;
+use super::turns;
 
 /// Charts of sudden changes, and over how long each takes the mean, s.
 pub(super) const ONSETS: usize = 3;
@@ -21,13 +26,11 @@ const BEFORE_SECS: f64 = 0.1;
 /// Time over which the covariance of each is learned, s; at least so many cells.
 const MEMORY_SECS: [f64; ONSETS] = [1.5, 3.0, 6.0];
 const MEMORY_CELLS: f64 = 200.0;
-/// The covariance is of the last seconds, in which the noise changes: factor on its variance.
-const CHANGING: f64 = 1.3;
-/// Cells in which the white part of the partial residuals' noise is learned, which changes as soon as the mass matrix does.
+/// Cells in which the white part of the partial residuals' noise is learned.
 const SWIFT_CELLS: f64 = 100.0;
 /// A second difference beyond so many standard deviations of a cell is no noise.
 const LONE: f64 = 8.0;
-/// The factorisation is renewed this often, s.
+/// The scale and the factorisation are renewed this often, s.
 const RENEWED_SECS: f64 = 0.008;
 
 /// What the charts read of one joint.
@@ -36,14 +39,15 @@ pub(super) struct Partial {
     /// Partial residuals, Nm, and their variances, Nm²; 0 while not enough is known.
     pub(super) residual: [f64; ONSETS],
     pub(super) variance: [f64; ONSETS],
-    /// The joint's own change, Nm.
-    pub(super) rise: [f64; ONSETS],
+    /// The square of the joint's own change, beyond what noise reaches, Nm².
+    pub(super) excess: [f64; ONSETS],
 }
 
 /// The charts of all joints.
 #[derive(Clone, Debug)]
 pub(super) struct Onset {
     cells: Cells,
+    scale: Scale,
     covariances: [Covariance; ONSETS],
     partials: Vec<Partial>,
     /// Variance of the white part of a cell's partial residuals, Nm².
@@ -55,9 +59,11 @@ pub(super) struct Onset {
 }
 
 impl Onset {
-    pub(super) fn new(dof: usize) -> Self {
+    pub(super) fn new(robot: &Robot) -> Self {
+        let dof = robot.dof();
         Self {
             cells: Cells::new(dof),
+            scale: Scale::new(robot),
             covariances: std::array::from_fn(|_| Covariance::new(dof)),
             partials: vec![Partial::default(); dof],
             white: vec![0.0; dof],
@@ -86,12 +92,13 @@ impl Onset {
     }
 
     /// Puts a sample's torques, Nm, on the charts. `jump` tells for a joint and a chart what its turning back adds to a
-    /// variance, Nm².
+    /// variance, Nm²; `position` is in rad.
     pub(super) fn look(
         &mut self,
+        position: &[f64],
         torques: impl Iterator<Item = f64>,
         step_secs: f64,
-        jump: impl Fn(usize, usize, f64) -> f64,
+        jump: impl Fn(usize, usize) -> f64,
     ) {
         self.is_new = self.cells.take(torques, step_secs);
         if !self.is_new {
@@ -101,6 +108,9 @@ impl Onset {
         let before = self.cells.length(BEFORE_SECS);
         let renewed = self.cells.length(RENEWED_SECS);
         let is_due = self.cells.count.is_multiple_of(renewed);
+        if is_due {
+            self.scale.renew(position);
+        }
         for (chart, covariance) in self.covariances.iter_mut().enumerate() {
             let recent = self.cells.length(RECENT_SECS[chart]);
             let Some(rises) = self.cells.rises(recent, before) else {
@@ -111,7 +121,7 @@ impl Onset {
                 *reading = rise;
             }
             if is_due {
-                covariance.factorise(|joint, variance| jump(joint, chart, variance));
+                covariance.factorise(&mut self.scale, |joint| jump(joint, chart));
             }
             if covariance.seen < MEMORY_CELLS {
                 continue;
@@ -122,10 +132,11 @@ impl Onset {
             let independent = covariance.seen.min(lasting) / recent as f64;
             for (joint, partial) in self.partials.iter_mut().enumerate() {
                 let fitted = (covariance.dof - 1 - joint) as f64;
-                let unsure = CHANGING * (1.0 + 2.0 * fitted / independent);
+                let unsure = 1.0 + 2.0 * fitted / independent;
                 let left = covariance.factor[joint * (covariance.dof + 1)];
                 partial.residual[chart] = covariance.partial[joint];
-                partial.rise[chart] = covariance.reading[joint];
+                partial.excess[chart] =
+                    turns::beyond_noise(covariance.reading[joint], covariance.noise[joint]);
                 partial.variance[chart] = unsure * left.max(share * self.white[joint]);
             }
         }
@@ -168,7 +179,7 @@ impl Onset {
         }
         for (covariance, secs) in self.covariances.iter_mut().zip(MEMORY_SECS) {
             let lasting = (secs / self.cells.cell_secs).max(MEMORY_CELLS);
-            covariance.learn(trust, lasting);
+            covariance.learn(&self.scale, trust, lasting);
         }
     }
 }
