@@ -314,7 +314,8 @@ impl Detector {
         } else {
             0.0
         };
-        if self.quiet_secs > self.parameters.release_secs {
+        // An end is a sudden change, too, and none that begins a contact.
+        if self.quiet_secs > self.parameters.release_secs && self.ratio() < 1.0 {
             self.end(stamp_ns);
         }
     }
