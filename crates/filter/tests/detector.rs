@@ -14,6 +14,8 @@ struct Stream {
     intake: Intake,
     random: Xoshiro256PlusPlus,
     rate_hz: f64,
+    /// Of every joint, rad.
+    position: f64,
     count: i64,
     events: Vec<ContactEvent>,
 }
@@ -33,6 +35,7 @@ impl Stream {
             intake: Intake::new(7),
             random: Xoshiro256PlusPlus::seed_from_u64(1),
             rate_hz,
+            position: 0.3,
             count: 0,
             events: Vec::new(),
         }
@@ -53,7 +56,7 @@ impl Stream {
             let mut normal = || StandardNormal.sample(random);
             let sample = JointSample {
                 stamp_ns: (self.count as f64 * 1e9 / self.rate_hz).round() as i64,
-                position: vec![0.3; 7],
+                position: vec![self.position; 7],
                 external_torque: torque(self.count as f64 / self.rate_hz, &mut normal).to_vec(),
             };
             let detection = self.detector.update(self.intake.admit(&sample).unwrap());
@@ -256,6 +259,20 @@ fn a_gap_and_a_jump_back_in_time_begin_anew_with_the_bias_known() {
     stream.feed_noisy(1.0, [0.12; 7]);
     assert!(stream.secs() < 2.0 && stream.events.is_empty());
     assert!((stream.detector.bias()[0].mean - before).abs() < 0.03);
+}
+
+#[test]
+fn a_leap_to_another_position_is_no_motion_that_hides_a_push() {
+    let mut stream = Stream::new(50.0);
+    stream.feed_noisy(2.0, [0.12; 7]);
+    stream.position = 1.5;
+    stream.feed_noisy(0.1, PUSH.map(|torque| torque + 0.12));
+    assert!(stream.detector.detection().in_contact);
+    stream.feed_noisy(1.0, [0.12; 7]);
+    let count = stream.events.len();
+    stream.position = -0.7;
+    stream.feed_noisy(1.0, [0.12; 7]);
+    assert_eq!(stream.events.len(), count, "{:?}", stream.events);
 }
 
 #[test]

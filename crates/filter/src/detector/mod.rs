@@ -38,7 +38,7 @@ pub use parameters::DetectorParameters;
 use reach::Reach;
 use turns::Turns;
 
-/// After so long without sample the smoothed residuals begin anew, s.
+/// After so long without sample, or a leap to another position, the smoothed residuals begin anew, s.
 const GAP_SECS: f64 = 0.5;
 /// A short contact that hardly stood out may have been none, and teaches: noise while little is known of it, else what
 /// happened on joints that turned back, if no other one felt it. In s and in thresholds.
@@ -194,7 +194,8 @@ impl Detector {
     fn advance(&mut self, stamp_ns: i64, position: &[f64]) -> f64 {
         let last_ns = self.last_ns.replace(stamp_ns);
         let step_secs = last_ns.map_or(0.0, |last_ns| secs_between(last_ns, stamp_ns));
-        let goes_on = step_secs > 0.0 && step_secs <= GAP_SECS;
+        let is_next = step_secs > 0.0 && step_secs <= GAP_SECS;
+        let goes_on = is_next && !self.motion.leaps(position, step_secs);
         self.begin_ns.get_or_insert(stamp_ns);
         if !goes_on {
             self.charts.begin();
@@ -313,7 +314,8 @@ impl Detector {
         } else {
             0.0
         };
-        if self.quiet_secs > self.parameters.release_secs {
+        // An end is a sudden change, too, and none that begins a contact.
+        if self.quiet_secs > self.parameters.release_secs && self.ratio() < 1.0 {
             self.end(stamp_ns);
         }
     }

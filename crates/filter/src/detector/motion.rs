@@ -20,6 +20,9 @@ const MOVED_SECS: f64 = 0.5;
 const JUMP_SPEED: f64 = 0.05;
 const CREEPING_SPEED: f64 = 0.003;
 const JUMP_SECS: f64 = 0.12;
+/// No joint moves faster, rad/s; nor is a change within a time as short as this, s, told from what stamps are wrong by.
+const FASTEST_SPEED: f64 = 20.0;
+const SHORT_SECS: f64 = 0.01;
 
 /// One joint's motion, in rad/s and rad/s².
 #[derive(Clone, Copy, Debug, Default)]
@@ -114,6 +117,13 @@ impl Motion {
     /// Whether only one position is known yet, and no speed.
     pub(super) fn has_begun(&self) -> bool {
         self.has_begun
+    }
+
+    /// Whether a joint cannot have moved to this position: another recording goes on, or the angle was wrapped.
+    pub(super) fn leaps(&self, position: &[f64], step_secs: f64) -> bool {
+        let furthest = FASTEST_SPEED * step_secs.max(SHORT_SECS);
+        let mut joints = self.joints.iter().zip(position);
+        joints.any(|(joint, position)| (position - joint.position).abs() > furthest)
     }
 
     /// Takes a position in.

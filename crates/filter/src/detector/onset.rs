@@ -19,12 +19,12 @@ use super::scale::Scale;
 use super::turns;
 
 /// Charts of sudden changes, and over how long each takes the mean, s.
-pub(super) const ONSETS: usize = 3;
-const RECENT_SECS: [f64; ONSETS] = [0.01, 0.02, 0.05];
+pub(super) const ONSETS: usize = 4;
+const RECENT_SECS: [f64; ONSETS] = [0.01, 0.02, 0.05, 0.1];
 /// Length of the time before, s.
 const BEFORE_SECS: f64 = 0.1;
 /// Time over which the covariance of each is learned, s; at least so many cells.
-const MEMORY_SECS: [f64; ONSETS] = [1.5, 3.0, 6.0];
+const MEMORY_SECS: [f64; ONSETS] = [1.5, 3.0, 6.0, 12.0];
 const MEMORY_CELLS: f64 = 200.0;
 /// Cells in which the white part of the partial residuals' noise is learned.
 const SWIFT_CELLS: f64 = 100.0;

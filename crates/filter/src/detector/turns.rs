@@ -8,10 +8,10 @@ const FIRST_SECS: f64 = 2.0;
 /// Time amidst its turns in which a joint's peak is forgotten, s, less before it turned for so long; then it tells as much
 /// of itself as the others do.
 const MEMORY_SECS: f64 = 30.0;
-/// Standard deviations that noise alone reaches in such a time; what is beyond is the turn's. And a factor on its variance,
-/// as the next turn may be worse.
+/// Standard deviations that noise alone reaches in such a time; what is beyond is the turn's. And factors on its variance,
+/// as the next turn may be worse; the slowest chart also shows what friction gets wrong of the speed around a turn.
 const NOISE_PEAK: f64 = 4.5;
-const WORSE: f64 = 1.5;
+const WORSE: [f64; ONSETS] = [1.5, 1.5, 1.5, 2.0];
 
 /// The part of a squared change, Nm², that noise of this variance, Nm², does not reach.
 pub(super) fn beyond_noise(change: f64, variance: f64) -> f64 {
@@ -68,7 +68,7 @@ impl Turns {
     pub(super) fn at(&self, chart: usize, turning: f64, pooled: &[f64; ONSETS]) -> f64 {
         let unknown = MEMORY_SECS / (MEMORY_SECS + self.seen);
         let peak = self.peaks[chart].max(unknown * pooled[chart]);
-        WORSE * turning * peak / (NOISE_PEAK * NOISE_PEAK)
+        WORSE[chart] * turning * peak / (NOISE_PEAK * NOISE_PEAK)
     }
 
     /// Learns from what happened.

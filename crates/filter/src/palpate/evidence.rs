@@ -28,6 +28,9 @@ const STIFFNESS_SCALE: f64 = 2e4;
 /// A term of the evidence whose exponent is so much less than another one's changes nothing.
 const NEGLIGIBLE: f64 = 80.0;
 
+/// Log of the evidence where torques and motion that no robot has leave no digit of it.
+const HOPELESS: f64 = -1e300;
+
 /// The evidence of the sums over a history. `path` are the joints that they belong to.
 pub(super) fn evidence(sums: &Sums, noise: &Noise, path: &[usize]) -> Evidence {
     let mut total = Total::default();
@@ -49,8 +52,9 @@ pub(super) fn evidence(sums: &Sums, noise: &Noise, path: &[usize]) -> Evidence {
                 reduced.tilt([force, stiffness, friction * force, friction * stiffness]);
         }
     }
+    let log = total.exponent + total.sum.ln();
     Evidence {
-        log: total.exponent + total.sum.ln(),
+        log: if log.is_finite() { log } else { HOPELESS },
         ..total.best
     }
 }
