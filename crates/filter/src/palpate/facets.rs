@@ -68,7 +68,7 @@ impl Peak {
         }
         for _ in 0..SCATTERED {
             let Some((here, _)) = self.coordinates(&self.obstacle.core) else {
-                return;
+                break;
             };
             let (obstacle, evidence, _) = self.try_at(&(here + self.way(random)), history);
             if evidence.log > self.evidence.log {

@@ -32,7 +32,7 @@ pub(super) struct Peak {
     pub(super) log_mass: f64,
     /// Whether the last step hardly moved it.
     pub(super) rests: bool,
-    pub(super) chart: Chart,
+    chart: Chart,
     precision: Square,
     /// Log of the volume of its Gaussian.
     log_volume: f64,

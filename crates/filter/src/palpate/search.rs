@@ -29,9 +29,13 @@ const ASKING: usize = 1000;
 impl PalpateFilter {
     /// Basin hopping (Wales and Doye 1997): climbs anew from beside the best peaks and from particles.
     pub(super) fn hop(&mut self, step: &Step, round: usize) {
-        let start = |filter: &Self, index, history: &History| filter.hop_start(index, history);
         let is_done = match round {
-            0 => self.begin_climbs(step, HOPS, step_cost(&self.peaks) + SCATTERING, start),
+            0 => self.begin_climbs(
+                step,
+                HOPS,
+                step_cost(&self.peaks) + SCATTERING,
+                Self::hop_start,
+            ),
             _ => self.climb_on(step),
         };
         if !is_done {
