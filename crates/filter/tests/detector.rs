@@ -146,6 +146,26 @@ fn a_push_is_found_soon_and_dated_to_its_begin_and_end() {
 }
 
 #[test]
+fn a_light_contact_goes_on_while_its_bias_becomes_less_known() {
+    let mut stream = Stream::new(100.0);
+    let light = |stream: &mut Stream, secs: f64, torque: f64| {
+        for _ in 0..(100.0 * secs) as usize {
+            stream.position = 0.3 + 0.05 * stream.secs().sin();
+            stream.feed(0.01, |_, normal| {
+                [0.0, 0.0, 0.0, torque, 0.0, 0.0, 0.0].map(|torque| torque + 0.02 * normal())
+            });
+        }
+    };
+    light(&mut stream, 20.0, 0.0);
+    light(&mut stream, 15.0, 0.3);
+    let changes =
+        |stream: &Stream| -> Vec<_> { (stream.events.iter().map(|event| event.change)).collect() };
+    assert_eq!(changes(&stream), [ContactChange::Start]);
+    light(&mut stream, 1.0, 0.0);
+    assert_eq!(changes(&stream), [ContactChange::Start, ContactChange::End]);
+}
+
+#[test]
 fn joints_that_feel_it_tell_the_first_link_that_can_be_touched() {
     let mut stream = Stream::new(100.0);
     stream.feed_noisy(2.0, [0.0; 7]);

@@ -15,6 +15,9 @@ const RELEASE: usize = 1;
 const CLIP: f64 = 6.0;
 /// Below so many standard deviations of the chart there is no sign of a contact.
 const CALM: f64 = 2.0;
+/// Standard deviations of a torque, with all that its frozen bias may have become, that say that a contact goes on: fewer
+/// than begin one, as it was there and nothing says that it went.
+const FROZEN: f64 = 3.0;
 
 /// Share of a squared limit that is beyond what noise reaches amid turns.
 const JUMP_SHARE: f64 = 0.5;
@@ -187,7 +190,9 @@ impl JointDetector {
             let last = std::mem::replace(&mut self.last_ratio[scale], ratio);
             self.compare(last, ratio, turning);
             if scale == RELEASE {
-                self.release_ratio = ratio;
+                let known = scene.threshold * (noise + self.bias.variance).sqrt();
+                let limit = known.max(FROZEN * std).max(self.least_torque);
+                self.release_ratio = smoothed / limit;
                 self.release_std = std;
             }
         }
