@@ -157,7 +157,7 @@ fn a_light_contact_goes_on_while_its_bias_becomes_less_known() {
         }
     };
     light(&mut stream, 20.0, 0.0);
-    light(&mut stream, 15.0, 0.3);
+    light(&mut stream, 15.0, 0.4);
     let changes =
         |stream: &Stream| -> Vec<_> { (stream.events.iter().map(|event| event.change)).collect() };
     assert_eq!(changes(&stream), [ContactChange::Start]);

@@ -14,6 +14,33 @@ pub(super) fn threshold(false_alarms_per_hour: f64, looks_per_hour: f64) -> f64 
     z
 }
 
+/// What the sum of `count` squared Gaussian statistics exceeds as rarely as one of them exceeds `z` standard deviations to
+/// either side: of the series of the χ² distribution's tail, all terms with a bound for what remains.
+pub(super) fn joined_threshold(z: f64, count: usize) -> f64 {
+    let tail = |x: f64, count: usize| {
+        let half = 0.5 * x;
+        let odd = count % 2 == 1;
+        let mut term = if odd {
+            (std::f64::consts::PI * half).sqrt().recip()
+        } else {
+            1.0
+        };
+        let mut sum = term;
+        for twice in (2 - count % 2..count - 1).step_by(2) {
+            term *= half / (0.5 * twice as f64);
+            sum += term;
+        }
+        sum
+    };
+    // Both without their common factor exp(-x / 2).
+    let rarity = tail(z * z, 1).ln() - 0.5 * z * z;
+    let mut x = z * z;
+    for _ in 0..20 {
+        x = 2.0 * (tail(x, count).ln() - rarity);
+    }
+    x
+}
+
 /// Probability that an hour without contact brings nothing as large as `ratio` times the threshold `z`.
 pub(super) fn confidence(false_alarms_per_hour: f64, z: f64, ratio: f64) -> f64 {
     let rarer = (-0.5 * z * z * (ratio * ratio - 1.0)).exp();
@@ -30,6 +57,16 @@ mod tests {
         assert!((threshold(2e-9, 1.0) - 5.9978).abs() < 0.01);
         assert!((threshold(2e-5, 1.0) - 4.2649).abs() < 0.03);
         assert!(threshold(1e3, 1.0) >= 1.0);
+    }
+
+    #[test]
+    fn joined_thresholds_are_the_chi_squared_distributions_quantiles() {
+        let z = threshold(2e-9, 1.0);
+        assert!((joined_threshold(z, 1) - z * z).abs() < 1e-9);
+        assert!((joined_threshold(z, 2) - -2.0 * 2e-9_f64.ln()).abs() < 0.02);
+        // Quantiles of 2e-9 by other means.
+        assert!((joined_threshold(z, 4) - 46.4344).abs() < 0.1);
+        assert!((joined_threshold(z, 7) - 54.3557).abs() < 0.1);
     }
 
     #[test]

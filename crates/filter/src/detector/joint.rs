@@ -3,6 +3,7 @@
 use super::bias::{BiasFilter, Forgetting};
 use super::noise::{Exposure, Span, Spread, White};
 use super::onset::{ONSETS, Partial};
+use super::touch::Ended;
 use super::turns::{TurnSpan, Turns};
 use super::{DetectorParameters, JointBias};
 
@@ -17,7 +18,7 @@ const CLIP: f64 = 6.0;
 const CALM: f64 = 2.0;
 /// Standard deviations of a torque, with all that its frozen bias may have become, that say that a contact goes on: fewer
 /// than begin one, as it was there and nothing says that it went.
-const FROZEN: f64 = 3.0;
+const FROZEN: f64 = 4.0;
 
 /// Share of a squared limit that is beyond what noise reaches amid turns.
 const JUMP_SHARE: f64 = 0.5;
@@ -300,17 +301,6 @@ impl JointDetector {
 
 fn at_most<const N: usize>(readings: [f64; N], limits: [f64; N]) -> [f64; N] {
     std::array::from_fn(|chart| readings[chart].abs().min(limits[chart]))
-}
-
-/// A contact that ended.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ended {
-    /// Whether it was short and hardly stood out.
-    pub(super) is_doubtful: bool,
-    /// Whether it was short and began where nothing but turning joints felt it.
-    pub(super) was_turn: bool,
-    /// Whether a joint felt it that did not turn.
-    pub(super) off_turns: bool,
 }
 
 /// What a sample is weighed with, the same for all joints.

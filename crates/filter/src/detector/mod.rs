@@ -6,15 +6,16 @@
 //! while nothing touches ([`noise`]): white noise from second differences, what does not average out from the smoothed
 //! residuals themselves, so that noise may be correlated or quantised, and what grows with motion or comes where a joint
 //! turns back ([`motion`]), as friction does ([`turns`]). Beside these are charts of sudden changes, of what the joints
-//! beyond do not explain of a joint's torque ([`onset`]): they notice pushes soonest, in fast motion too. The bias is a
-//! slow random walk ([`bias`]), faster in motion. What was learned shortly before a contact is taken back ([`blocks`]),
-//! and nothing is learned during one.
+//! beyond do not explain of a joint's torque ([`onset`]), and of all joints together ([`joined`]): they notice pushes
+//! soonest, in fast motion too. The bias is a slow random walk ([`bias`]), faster in motion. What was learned shortly before
+//! a contact is taken back ([`blocks`]), and nothing is learned during one ([`touch`]).
 
 mod alarm;
 mod bias;
 mod blocks;
 mod cells;
 mod covariance;
+mod joined;
 mod joint;
 mod motion;
 mod noise;
@@ -22,6 +23,7 @@ mod onset;
 mod parameters;
 mod reach;
 mod scale;
+mod touch;
 mod turns;
 
 use palpate_model::{JointSample, Robot};
@@ -31,19 +33,17 @@ use crate::{Admitted, ContactChange, ContactEvent, Detection, ParameterError};
 use bias::Forgetting;
 pub use bias::JointBias;
 use blocks::Blocks;
-use joint::{Charts, Ended, JointDetector, Weighing};
+use joined::Joined;
+use joint::{Charts, JointDetector, Weighing};
 use motion::Motion;
 use onset::Onset;
 pub use parameters::DetectorParameters;
 use reach::Reach;
+use touch::Touch;
 use turns::Turns;
 
 /// After so long without sample, or a leap to another position, the smoothed residuals begin anew, s.
 const GAP_SECS: f64 = 0.5;
-/// A short contact that hardly stood out may have been none, and teaches: noise while little is known of it, else what
-/// happened on joints that turned back, if no other one felt it. In s and in thresholds.
-const DOUBTFUL_SECS: f64 = 3.0;
-const DOUBTFUL_RATIO: f64 = 1.5;
 /// Time over which the time between samples is learned, in samples.
 const PERIOD_SAMPLES: f64 = 50.0;
 /// A contact within this time of the stream's begin was not seen to begin, s.
@@ -57,6 +57,7 @@ pub struct Detector {
     joints: Vec<JointDetector>,
     charts: Charts,
     onset: Onset,
+    joined: Joined,
     motion: Motion,
     blocks: Blocks,
     /// First stamp of the stream, and of what came after the last time that a contact was forgotten.
@@ -64,14 +65,7 @@ pub struct Detector {
     last_ns: Option<i64>,
     period_secs: f64,
     weighing: Weighing,
-    /// Whether the present contact stands out well, and whether a joint feels it that does not turn.
-    stands_out: bool,
-    is_off_turns: bool,
-    /// The joint that alone feels it, if that turned when it began to.
-    turned: Option<usize>,
-    quiet_secs: f64,
-    /// Where the robot was when the present contact began.
-    contact_position: Vec<f64>,
+    touch: Touch,
     reach: Reach,
     bias: Vec<JointBias>,
     detection: Detection,
@@ -90,17 +84,14 @@ impl Detector {
             joints: vec![joint; dof],
             charts: Charts::default(),
             onset: Onset::new(robot),
+            joined: Joined::new(dof),
             motion: Motion::new(dof),
             blocks: Blocks::new(dof),
             begin_ns: None,
             last_ns: None,
             period_secs: 0.01,
             weighing: Weighing::default(),
-            stands_out: false,
-            is_off_turns: false,
-            turned: None,
-            quiet_secs: 0.0,
-            contact_position: vec![0.0; dof],
+            touch: Touch::new(dof),
             reach: Reach::new(robot),
             bias: vec![JointBias::default(); dof],
             detection: Detection {
@@ -180,6 +171,11 @@ impl Detector {
         for (joint, (&turning, partial)) in self.joints.iter_mut().zip(found) {
             joint.weigh(stamp_ns, turning, &self.charts, partial, &weighing);
         }
+        (self.joined).weigh(
+            self.onset.partials(),
+            weighing.threshold,
+            self.parameters.least_torque,
+        );
         self.detection.event = None;
         match self.detection.in_contact {
             true => self.watch_for_end(stamp_ns, step_secs),
@@ -219,10 +215,10 @@ impl Detector {
 
     fn weighing_at(&self, stamp_ns: i64, position: &[f64]) -> Weighing {
         let looks = 3600.0 / self.period_secs
-            * (self.joints.len() * (joint::CHARTS + onset::ONSETS)) as f64;
+            * (self.joints.len() * (joint::CHARTS + 2 * onset::ONSETS)) as f64;
         let frozen_variance = self.detection.since_ns.map_or(0.0, |since_ns| {
             let secs = secs_between(since_ns, stamp_ns).max(0.0);
-            bias::frozen_variance(distance(position, &self.contact_position), secs)
+            self.touch.frozen_variance(position, secs)
         });
         Weighing {
             threshold: alarm::threshold(self.parameters.false_alarms_per_hour, looks),
@@ -231,19 +227,27 @@ impl Detector {
         }
     }
 
-    /// How far the joint that speaks most for a contact is beyond its threshold: 1 is at it.
+    /// How far the chart that speaks most for a contact is beyond its threshold: 1 is at it.
     fn ratio(&self) -> f64 {
-        (self.joints.iter()).fold(0.0, |most, joint| f64::max(most, joint.ratio))
+        (self.joints.iter()).fold(self.joined.ratio, |most, joint| most.max(joint.ratio))
+    }
+
+    /// The joint that speaks most for a contact.
+    fn strongest(&self) -> Option<usize> {
+        let ratio = |joint: usize| self.joints[joint].ratio;
+        (0..self.joints.len()).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))
     }
 
     fn watch_for_start(&mut self, stamp_ns: i64, position: &[f64], step_secs: f64) {
         let newest = self.joints.iter().map(|joint| joint.newest_ratio);
-        let newest = newest.fold(0.0, f64::max);
+        let newest = newest.fold(self.joined.newest_ratio, f64::max);
         if newest < 1.0 {
             return self.learn(stamp_ns, step_secs, newest);
         }
-        let loud = (self.joints.iter()).filter(|joint| joint.ratio >= 1.0);
-        let strongest = loud.max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+        if self.ratio() < 1.0 {
+            return;
+        }
+        let strongest = self.strongest().map(|joint| &self.joints[joint]);
         let Some(since_ns) = strongest.and_then(|joint| joint.stirred_ns) else {
             return;
         };
@@ -269,11 +273,7 @@ impl Detector {
 
     fn start(&mut self, stamp_ns: i64, since_ns: i64, position: &[f64]) {
         self.blocks.restore(since_ns, &mut self.joints);
-        self.contact_position.copy_from_slice(position);
-        self.quiet_secs = 0.0;
-        self.stands_out = false;
-        self.is_off_turns = false;
-        self.turned = self.turned_alone();
+        self.touch.begin(position, &self.joints, &self.motion);
         self.detection.in_contact = true;
         self.detection.since_ns = Some(since_ns);
         self.detection.first_link = None;
@@ -285,50 +285,23 @@ impl Detector {
         });
     }
 
-    /// The joint that alone feels something, while it turns.
-    fn turned_alone(&self) -> Option<usize> {
-        let mut loud = (0..self.joints.len()).filter(|&joint| self.joints[joint].ratio >= 1.0);
-        let (first, other) = (loud.next(), loud.next());
-        let turns = |joint: &usize| self.motion.turning()[*joint].narrow >= joint::DOUBTFUL_TURN;
-        first.filter(turns).filter(|_| other.is_none())
-    }
-
     fn watch_for_end(&mut self, stamp_ns: i64, step_secs: f64) {
         let x2 = self.weighing.x2;
         for (joint, turning) in self.joints.iter_mut().zip(self.motion.turning()) {
             joint.doubt(step_secs, x2, *turning);
-            self.stands_out |= joint.ratio >= DOUBTFUL_RATIO;
-            self.is_off_turns |= joint.is_off_turns;
         }
-        let felt_beside = |turned: usize| {
-            let mut joints = self.joints.iter().enumerate();
-            joints.any(|(joint, other)| joint != turned && other.ratio >= 1.0)
-        };
-        if self.turned.is_some_and(felt_beside) {
-            self.turned = None;
-        }
-        let share = self.parameters.release_share;
-        let is_quiet = self.joints.iter().all(|joint| joint.release_ratio < share);
-        self.quiet_secs = if is_quiet {
-            self.quiet_secs + step_secs
-        } else {
-            0.0
-        };
+        let (ratio, share) = (self.ratio(), self.parameters.release_share);
+        self.touch.watch(&self.joints, ratio, share, step_secs);
         // An end is a sudden change, too, and none that begins a contact.
-        if self.quiet_secs > self.parameters.release_secs && self.ratio() < 1.0 {
+        if self.touch.quiet_secs > self.parameters.release_secs && ratio < 1.0 {
             self.end(stamp_ns);
         }
     }
 
     fn end(&mut self, stamp_ns: i64) {
-        let quiet_ns = (self.quiet_secs * 1e9) as i64;
+        let quiet_ns = (self.touch.quiet_secs * 1e9) as i64;
         let since_ns = self.detection.since_ns.unwrap_or(stamp_ns);
-        let was_short = secs_between(since_ns, stamp_ns) < DOUBTFUL_SECS;
-        let ended = Ended {
-            was_turn: was_short && self.turned.is_some(),
-            is_doubtful: was_short && !self.stands_out,
-            off_turns: self.is_off_turns,
-        };
+        let ended = self.touch.ended(secs_between(since_ns, stamp_ns));
         self.detection.in_contact = false;
         self.detection.since_ns = None;
         self.detection.first_link = None;
@@ -376,9 +349,9 @@ impl Detector {
         self.joints.fill(JointDetector::new(&self.parameters));
         self.charts.begin();
         self.onset.forget();
+        self.joined = Joined::new(self.joints.len());
         self.blocks.clear();
         self.last_ns = None;
-        self.quiet_secs = 0.0;
         self.bias.fill(JointBias::default());
         self.forget_contact();
     }
@@ -386,19 +359,12 @@ impl Detector {
     /// Forgets the present contact; bias and noise stay.
     pub fn forget_contact(&mut self) {
         self.begin_ns = None;
-        self.quiet_secs = 0.0;
         self.detection.joints.fill(false);
         self.detection = Detection {
             joints: std::mem::take(&mut self.detection.joints),
             ..Detection::default()
         };
     }
-}
-
-/// Euclidean distance of two positions, rad.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
-    squares.sum::<f64>().sqrt()
 }
 
 /// Time from one stamp to another, s.
