@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Counts the instructions of the filter's steps (valgrind's callgrind; one thread, fixed seeds) and compares them with
 # tests/instructions.txt: instructions do not depend on the machine's mood. Fails when a step needs over 5 % more.
-# `tests/instructions.sh --renew` stores what is counted now. Needs valgrind, and a processor with AVX2: without it a step
-# takes more.
+# `tests/instructions.sh --renew` stores what is counted now; `--build` only builds what counts. Needs valgrind, and a
+# processor with AVX2: without it a step takes more.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -14,6 +14,9 @@ if ! command -v valgrind >/dev/null; then
 fi
 program=$(cargo bench --quiet --package palpate-filter --bench instructions --no-run --message-format=json |
     sed -n 's/.*"executable":"\([^"]*\)".*/\1/p' | tail -n 1)
+if [ "${1:-}" = --build ]; then
+    exit
+fi
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
