@@ -16,9 +16,6 @@ const RELEASE: usize = 1;
 const CLIP: f64 = 6.0;
 /// Below so many standard deviations of the chart there is no sign of a contact.
 const CALM: f64 = 2.0;
-/// Standard deviations of a torque, with all that its frozen bias may have become, that say that a contact goes on: fewer
-/// than begin one, as it was there and nothing says that it went.
-const FROZEN: f64 = 4.0;
 
 /// Share of a squared limit that is beyond what noise reaches amid turns.
 const JUMP_SHARE: f64 = 0.5;
@@ -192,7 +189,7 @@ impl JointDetector {
             self.compare(last, ratio, turning);
             if scale == RELEASE {
                 let known = scene.threshold * (noise + self.bias.variance).sqrt();
-                let limit = known.max(FROZEN * std).max(self.least_torque);
+                let limit = known.max(scene.lasting * std).max(self.least_torque);
                 self.release_ratio = smoothed / limit;
                 self.release_std = std;
             }
@@ -308,6 +305,8 @@ fn at_most<const N: usize>(readings: [f64; N], limits: [f64; N]) -> [f64; N] {
 pub(super) struct Weighing {
     /// Standard deviations that begin a contact.
     pub(super) threshold: f64,
+    /// Those that say that one goes on, where the bias is as uncertain as it became meanwhile.
+    pub(super) lasting: f64,
     /// Squared quickness of the motion.
     pub(super) x2: f64,
     /// By how much the biases became more uncertain since they are frozen, Nm²; 0 without contact.

@@ -220,9 +220,12 @@ impl Detector {
             let secs = secs_between(since_ns, stamp_ns).max(0.0);
             self.touch.frozen_variance(position, secs)
         });
+        let threshold = alarm::threshold(self.parameters.false_alarms_per_hour, looks);
+        let quickness = self.motion.quickness();
         Weighing {
-            threshold: alarm::threshold(self.parameters.false_alarms_per_hour, looks),
-            x2: self.motion.quickness().powi(2),
+            threshold,
+            lasting: touch::lasting(threshold, quickness),
+            x2: quickness * quickness,
             frozen_variance,
         }
     }

@@ -9,6 +9,18 @@ use super::motion::Motion;
 const DOUBTFUL_SECS: f64 = 3.0;
 const DOUBTFUL_RATIO: f64 = 1.5;
 
+/// Standard deviations of a torque that say that a contact goes on while the arm is at rest, and how quick it is where as
+/// many are needed as begin one, 0 to 1.
+const LASTING: f64 = 4.0;
+const QUICK: f64 = 0.5;
+
+/// Standard deviations that say that a contact goes on, with all that the frozen bias may have become among them, given
+/// those that begin one. While the arm explores slowly, they are fewer: it was there, and nothing says that it went. In
+/// fast motion a torque that lasts may be a bias that became wrong.
+pub(super) fn lasting(threshold: f64, quickness: f64) -> f64 {
+    LASTING + (threshold - LASTING) * (quickness / QUICK).min(1.0)
+}
+
 /// What is known of the present contact; without one, of the last.
 #[derive(Clone, Debug)]
 pub(super) struct Touch {
