@@ -6,7 +6,7 @@
 //! the χ² distribution with k degrees of freedom.
 
 use super::alarm;
-use super::onset::{ONSETS, Partial};
+use super::onset::{ONSETS, Onset, Partial};
 
 /// The limits are renewed when the threshold of one joint changed by so many standard deviations.
 const RENEWED: f64 = 0.01;
@@ -37,7 +37,18 @@ impl Joined {
 
     /// Weighs what the charts of sudden changes read. `threshold` is that of one joint, standard deviations; below
     /// `least_torque`, Nm, on each joint nothing is a contact.
-    pub(super) fn weigh(&mut self, partials: &[Partial], threshold: f64, least_torque: f64) {
+    pub(super) fn weigh(&mut self, onset: &Onset, threshold: f64, least_torque: f64) {
+        let is_known = std::array::from_fn(|chart| onset.is_well_known(chart));
+        self.weigh_partials(onset.partials(), is_known, threshold, least_torque);
+    }
+
+    fn weigh_partials(
+        &mut self,
+        partials: &[Partial],
+        is_known: [bool; ONSETS],
+        threshold: f64,
+        least_torque: f64,
+    ) {
         if (threshold - self.threshold).abs() > RENEWED {
             self.threshold = threshold;
             for (count, limit) in self.limits.iter_mut().enumerate() {
@@ -47,6 +58,10 @@ impl Joined {
         self.ratio = 0.0;
         self.newest_ratio = 0.0;
         for (chart, last) in self.last_ratio.iter_mut().enumerate() {
+            if !is_known[chart] {
+                *last = 0.0;
+                continue;
+            }
             let most =
                 (partials.iter()).fold(0.0, |most, p| f64::max(most, p.residual[chart].abs()));
             let newest = furthest(partials, chart, &self.limits).min(most / least_torque);
@@ -86,7 +101,7 @@ mod tests {
             .collect();
         let mut joined = Joined::new(readings.len());
         for _ in 0..samples {
-            joined.weigh(&partials, 6.0, least_torque);
+            joined.weigh_partials(&partials, [true; ONSETS], 6.0, least_torque);
         }
         joined
     }

@@ -172,7 +172,7 @@ impl Detector {
             joint.weigh(stamp_ns, turning, &self.charts, partial, &weighing);
         }
         (self.joined).weigh(
-            self.onset.partials(),
+            &self.onset,
             weighing.threshold,
             self.parameters.least_torque,
         );

@@ -26,6 +26,8 @@ const BEFORE_SECS: f64 = 0.1;
 /// Time over which the covariance of each is learned, s; at least so many cells.
 const MEMORY_SECS: [f64; ONSETS] = [1.5, 3.0, 6.0, 12.0];
 const MEMORY_CELLS: f64 = 200.0;
+/// The covariance of a chart is well known once it was learned from so many means that have no cell in common.
+const WELL_KNOWN: f64 = 60.0;
 /// Cells in which the white part of the partial residuals' noise is learned.
 const SWIFT_CELLS: f64 = 100.0;
 /// A second difference beyond so many standard deviations of a cell is no noise.
@@ -84,6 +86,13 @@ impl Onset {
         self.cells.begin();
         self.partials.fill(Partial::default());
         self.is_new = false;
+    }
+
+    /// Whether what the joints read together can be told from noise. How much of it noise makes is known later than for
+    /// one joint alone: of few means any joints seem to be related (the tails of Hotelling's T²).
+    pub(super) fn is_well_known(&self, chart: usize) -> bool {
+        let recent = self.cells.length(RECENT_SECS[chart]);
+        self.covariances[chart].seen >= WELL_KNOWN * recent as f64
     }
 
     /// What the charts read, by joint.
