@@ -6,7 +6,8 @@
 use nalgebra::{Matrix3, Vector3};
 use wide::f32x4;
 
-use crate::triangle::{NONE, Triangle};
+use crate::Landing;
+use crate::triangle::Triangle;
 
 /// What a walk over triangles in single precision touches: two lines of a cache.
 #[derive(Clone, Debug)]
@@ -114,10 +115,22 @@ impl Plate {
         depths.simd_ge(least).to_bitmask() & edges == edges
     }
 
-    /// The triangle across an edge; none at a rim.
+    /// The triangle across an edge; [`NONE`] at a rim.
     #[inline(always)]
-    pub(crate) fn beyond(&self, edge: usize) -> Option<u32> {
-        Some(self.across[edge]).filter(|&triangle| triangle != NONE)
+    pub(crate) fn beyond(&self, edge: usize) -> u32 {
+        self.across[edge]
+    }
+
+    /// Where a point lands whose closest point is inside, `height` below it.
+    #[inline(always)]
+    pub(crate) fn landing(&self, query: &Vector3<f32>, triangle: u32, height: f32) -> Landing {
+        let normal = self.normal();
+        Landing {
+            point: query - normal * height,
+            normal,
+            triangle,
+            distance: height.abs(),
+        }
     }
 
     /// The point of an edge that is closest to a query beyond it.

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
-use palpate_model::{Landing, Surface};
+use palpate_model::Surface;
 use serde::{Deserialize, Serialize};
 
 use super::draws::Draws;
@@ -117,7 +117,10 @@ impl LinkMotion {
         }
         for at in range {
             let centre = vector(centres, at);
-            let touch = self.touch(surface, &centre, block.triangle[at], at);
+            let mut touch = surface.land(&centre, block.triangle[at]);
+            if at % AUDIT == self.audited {
+                surface.audit(&centre, &mut touch);
+            }
             block.force[at] += (draws.radius[at] - touch.distance) * block.stiffness[at];
             block.land(at, &touch);
         }
@@ -126,16 +129,6 @@ impl LinkMotion {
     #[inline(always)]
     fn moved(&self, point: Vector3<f32>) -> Vector3<f32> {
         point + (self.turn * point + self.shift)
-    }
-
-    /// Where a ball about `centre` touches: walks from the last triangle; for some particles that is audited.
-    #[inline(always)]
-    fn touch(&self, surface: &Surface, centre: &Vector3<f32>, triangle: u32, at: usize) -> Landing {
-        let walked = surface.land(centre, triangle);
-        match at % AUDIT == self.audited {
-            true => surface.audit(centre, walked),
-            false => walked,
-        }
     }
 }
 
