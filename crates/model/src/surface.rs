@@ -180,13 +180,23 @@ impl Surface {
     /// across a few edges. The answer is as exact but for rounding, 0.1 µm on a link of a metre.
     #[inline(always)]
     pub fn land(&self, query: &Vector3<f32>, start: u32) -> Landing {
+        self.land_then(query, start, |landing| landing)
+    }
+
+    /// Does something with what [`Surface::land`] finds, which then need not go through memory.
+    #[inline(always)]
+    pub fn land_then<T>(
+        &self,
+        query: &Vector3<f32>,
+        start: u32,
+        take: impl FnOnce(Landing) -> T,
+    ) -> T {
         const MOST: usize = 6;
         let (mut triangle, mut before) = (start, NONE);
         for _ in 0..MOST {
             let plate = &self.plates[triangle as usize];
             match plate.side(query) {
-                // Returned as it is: a copy of what was just written part by part would have to wait for the parts.
-                Side::Inside(height) => return plate.landing(query, triangle, height),
+                Side::Inside(height) => return take(plate.landing(query, triangle, height)),
                 Side::InReach => break,
                 Side::Beyond(edge) => {
                     let beyond = plate.beyond(edge);
@@ -194,13 +204,13 @@ impl Surface {
                         break;
                     }
                     if beyond == before {
-                        return self.land_on_edge(query, triangle, edge, start);
+                        return take(self.land_on_edge(query, triangle, edge, start));
                     }
                     (before, triangle) = (triangle, beyond);
                 }
             }
         }
-        self.land_by_walk(query, start)
+        take(self.land_by_walk(query, start))
     }
 
     /// Where both triangles of an edge see the query beyond it.
@@ -264,9 +274,10 @@ impl Surface {
         self.land(query, nearest.item)
     }
 
-    /// Puts a landing that [`Surface::land`] has found for `query` on the closest point of the whole surface: a walk does
-    /// not see a place far away that is closer. Allocates nothing.
-    pub fn audit(&self, query: &Vector3<f32>, found: &mut Landing) {
+    /// The closest point of the whole surface to `query`, given one that [`Surface::land`] has found: a walk does not see
+    /// a place far away that is closer. Allocates nothing.
+    #[inline(never)]
+    pub fn audit(&self, query: &Vector3<f32>, found: Landing) -> Landing {
         let at = Point3::from(query.cast());
         let mut closest = None;
         let mut squared = f64::from(found.distance).powi(2);
@@ -281,9 +292,7 @@ impl Surface {
             }
             squared as f32
         });
-        if let Some(closest) = closest {
-            *found = self.landing(query, closest);
-        }
+        closest.map_or(found, |closest| self.landing(query, closest))
     }
 
     fn landing(&self, query: &Vector3<f32>, found: SurfacePoint) -> Landing {
@@ -578,8 +587,7 @@ mod tests {
             let start = surface.sample(uniform(index + 7)).triangle;
             let single = query.coords.cast();
             let walked = surface.land(&single, start);
-            let mut found = walked;
-            surface.audit(&single, &mut found);
+            let found = surface.audit(&single, walked);
             let exact = brute_force(&surface, &query);
             assert!((f64::from(found.distance) - exact).abs() < 1e-7, "{query}");
             assert!(((found.point - single).norm() - found.distance).abs() < 1e-7);

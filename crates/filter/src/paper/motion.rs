@@ -92,7 +92,8 @@ impl LinkMotion {
         scatter(block, range.clone(), draws, places);
         for at in range.clone() {
             let query = vector(places, at);
-            block.land(at, &surface.land(&query, block.triangle[at]));
+            let start = block.triangle[at];
+            surface.land_then(&query, start, |landing| block.land(at, &landing));
         }
         for at in range {
             block.force[at] = (block.force[at] + draws.force[at]).clamp(0.0, MOST);
@@ -117,12 +118,14 @@ impl LinkMotion {
         }
         for at in range {
             let centre = vector(centres, at);
-            let mut touch = surface.land(&centre, block.triangle[at]);
-            if at % AUDIT == self.audited {
-                surface.audit(&centre, &mut touch);
-            }
-            block.force[at] += (draws.radius[at] - touch.distance) * block.stiffness[at];
-            block.land(at, &touch);
+            let start = block.triangle[at];
+            surface.land_then(&centre, start, |mut touch| {
+                if at % AUDIT == self.audited {
+                    touch = surface.audit(&centre, touch);
+                }
+                block.force[at] += (draws.radius[at] - touch.distance) * block.stiffness[at];
+                block.land(at, &touch);
+            });
         }
     }
 
