@@ -129,7 +129,7 @@ impl Cell {
     fn measure(&mut self, robot: &Robot, round: usize) {
         let (plain_rounds, rounds) = match self.particles {
             ..100_000 => (ROUNDS, ROUNDS),
-            ..1_000_000 => (2, ROUNDS),
+            100_000..1_000_000 => (2, ROUNDS),
             _ => (0, 2),
         };
         if round < plain_rounds {
