@@ -161,7 +161,7 @@ impl Cell {
     }
 }
 
-/// All are measured so often, in turns: what else a machine does slows it for seconds and minutes.
+/// So often all is measured that does not take minutes, in turns: what else a machine does slows it for seconds and minutes.
 const ROUNDS: usize = 6;
 
 fn step_lines(robot: &Robot) {
@@ -171,7 +171,7 @@ fn step_lines(robot: &Robot) {
             cell.measure(robot, round);
         }
     }
-    for sizes in cells.chunk_by(|one, other| one.cloud as u8 == other.cloud as u8) {
+    for sizes in cells.chunk_by(|one, other| one.cloud == other.cloud) {
         sizes.iter().for_each(Cell::lines);
         let median = |particles: usize, threads: usize| {
             let cell = sizes.iter().find(|cell| cell.particles == particles);
@@ -268,11 +268,7 @@ fn main() {
     }
     replay_lines(&robot);
     palpate_lines(&robot);
-    line(
-        "whole step, quietest of 6 rounds: median · p99, ms",
-        "",
-        "",
-        "",
-    );
+    let what = format!("whole step, quietest of {ROUNDS} rounds: median · p99, ms");
+    line(&what, "", "", "");
     step_lines(&robot);
 }

@@ -4,7 +4,7 @@ use palpate_model::{JointSample, Robot};
 use palpate_sim::{Scenario, simulate};
 
 /// What the particles are like while steps are measured.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cloud {
     /// Gathered around the contact, after motion.
     Converged,
