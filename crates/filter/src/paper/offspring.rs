@@ -122,6 +122,42 @@ impl Generation {
         self.before_block.last().copied().unwrap_or(0.0)
     }
 
+    /// The parents of at most [`BLOCK`] successive children, of which `first` is the number of the first: of each the
+    /// first one with which the sum of the weights reaches the child's tooth. How many children a parent has cannot be
+    /// predicted, so no branch asks: each is put down where its children would begin, and gives way to the next one
+    /// where it has none.
+    fn find_parents(
+        &self,
+        parents: &Cloud,
+        first: usize,
+        children: usize,
+    ) -> impl Iterator<Item = u32> {
+        let mut places = [0; BLOCK + 1];
+        let teeth = self.children.last().copied().unwrap_or(0) as f64;
+        let per_weight = teeth / self.total().max(f64::MIN_POSITIVE);
+        let before = first as f64 + self.offset;
+        let ends = &self.before_block[1..];
+        let begin = ends.partition_point(|&end| end * per_weight < before);
+        let mut next = 0;
+        for index in begin.min(ends.len().saturating_sub(1))..ends.len() {
+            if next == children {
+                break;
+            }
+            let block = &parents.blocks[index];
+            let mut sum = self.before_block[index];
+            for at in 0..BLOCK {
+                places[next] = (index * BLOCK + at) as u32;
+                sum += weight(block, at);
+                next = ((sum * per_weight - before + 1.0) as usize).min(children);
+            }
+        }
+        let latest = |parent: &mut u32, at: u32| {
+            *parent = at.max(*parent);
+            Some(*parent)
+        };
+        places.into_iter().take(children).scan(0, latest)
+    }
+
     /// Fills those places of a block that belong to one link; `first` is the number among the link's particles of the
     /// first one.
     fn fill_run(
@@ -136,53 +172,15 @@ impl Generation {
         let [before, after] = [run.link, run.link + 1].map(|link| self.children[link]);
         let children = (after - before).saturating_sub(first).min(run.range.len());
         let middle = run.range.start + children;
-        if children > 0 {
-            let tooth = self.total() / self.children.last().copied().unwrap_or(1) as f64;
-            let last = parents.starts[run.link + 1] - 1;
-            let mut wanted = (before + first) as f64 + self.offset;
-            let mut parent = Parent::at(self, parents, wanted * tooth);
-            for at in run.range.start..middle {
-                parent.advance(self, parents, wanted * tooth);
-                let index = parent.index.clamp(parents.starts[run.link], last);
-                block.copy(at, &parents.blocks[index / BLOCK], index % BLOCK);
-                wanted += 1.0;
-            }
+        let (start, end) = (parents.starts[run.link], parents.starts[run.link + 1]);
+        let found = self.find_parents(parents, before + first, children);
+        for (at, parent) in (run.range.start..middle).zip(found) {
+            let parent = (parent as usize).clamp(start, end - 1);
+            block.copy(at, &parents.blocks[parent / BLOCK], parent % BLOCK);
         }
         for at in middle..run.range.end {
             block.set(at, &nursery.fresh(run.link, random));
             block.weight[at] = 1.0;
-        }
-    }
-}
-
-/// A parent, and the sum of the weights up to and with it.
-struct Parent {
-    index: usize,
-    cumulative: f64,
-}
-
-impl Parent {
-    /// The first one of the block in which the sum reaches `wanted`.
-    fn at(generation: &Generation, parents: &Cloud, wanted: f64) -> Self {
-        let ends = &generation.before_block[1..];
-        let block = ends
-            .partition_point(|&end| end < wanted)
-            .min(ends.len() - 1);
-        Self {
-            index: block * BLOCK,
-            cumulative: generation.before_block[block] + weight(&parents.blocks[block], 0),
-        }
-    }
-
-    /// The first one from here on at which the sum reaches `wanted`.
-    fn advance(&mut self, generation: &Generation, parents: &Cloud, wanted: f64) {
-        while self.cumulative < wanted && self.index + 1 < parents.len() {
-            self.index += 1;
-            let (block, at) = (self.index / BLOCK, self.index % BLOCK);
-            if at == 0 {
-                self.cumulative = generation.before_block[block];
-            }
-            self.cumulative += weight(&parents.blocks[block], at);
         }
     }
 }
