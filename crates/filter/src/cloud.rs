@@ -175,12 +175,22 @@ impl Cloud {
 
     /// The particles of a link, block by block.
     pub(crate) fn of_link(&self, link: usize) -> impl Iterator<Item = (&Block, Range<usize>)> {
+        (self.blocks_of_link(link)).map(move |index| self.block_of_link(link, index))
+    }
+
+    /// Indices of the blocks that hold particles of a link.
+    pub(crate) fn blocks_of_link(&self, link: usize) -> Range<usize> {
         let (start, end) = (self.starts[link], self.starts[link + 1]);
-        let blocks = match start < end {
+        match start < end {
             true => start / BLOCK..end.div_ceil(BLOCK),
             false => 0..0,
-        };
-        blocks.map(move |index| (&self.blocks[index], within(index, start, end)))
+        }
+    }
+
+    /// A block, and which of its particles are of a link.
+    pub(crate) fn block_of_link(&self, link: usize, index: usize) -> (&Block, Range<usize>) {
+        let (start, end) = (self.starts[link], self.starts[link + 1]);
+        (&self.blocks[index], within(index, start, end))
     }
 
     /// The particles of a block, link by link.

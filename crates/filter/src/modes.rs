@@ -5,6 +5,8 @@ use std::ops::Range;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use palpate_model::{Kinematics, Robot};
 use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
 use wide::f32x8;
 
 use crate::Mode;
@@ -30,6 +32,8 @@ pub(crate) struct ModeFinder {
     grids: Vec<Option<Grid>>,
     /// What the modes found so far hold, in their order.
     balls: Vec<Ball>,
+    /// What each block adds to the sums over a ball.
+    of_blocks: Vec<[f64; SUMS]>,
     processor: Arch,
 }
 
@@ -57,6 +61,7 @@ impl ModeFinder {
         Self {
             grids: robot.links.iter().enumerate().map(grid).collect(),
             balls: Vec::with_capacity(MOST),
+            of_blocks: Vec::new(),
             processor: Arch::new(),
         }
     }
@@ -126,7 +131,7 @@ impl ModeFinder {
             for (block, range) in cloud.of_link(link) {
                 for group in groups(&range).step_by(stride) {
                     let weights = weights(block, group, &range) * block.scale as f32;
-                    grid.add(place(block, group), weights);
+                    grid.add(&place(block, group), weights);
                 }
             }
         }
@@ -145,13 +150,18 @@ impl ModeFinder {
     fn climb(&self, cloud: &Cloud, link: usize, start: Point3<f64>) -> Ball {
         let centre = start.coords.cast().into();
         let mut ball = Ball { link, centre };
-        let summands = |_: &Block, _: usize, weight: Eight, offset: [Eight; 3]| {
+        let summands = |_: usize, weight: Eight, offset: [Eight; 3]| {
             let [x, y, z] = offset;
             [weight, x * weight, y * weight, z * weight]
         };
         for _ in 0..2 {
             let mut sums = [0.0; 4];
-            self.visit(cloud, &ball, summands, stride(cloud), &mut sums);
+            for of_link in cloud.of_link(link) {
+                add(
+                    &mut sums,
+                    self.visit(&ball, of_link, stride(cloud), summands),
+                );
+            }
             let [total, ..] = sums;
             if total > 0.0 {
                 for axis in 0..3 {
@@ -162,65 +172,57 @@ impl ModeFinder {
         ball
     }
 
-    /// Sums up what `ball` holds.
-    #[inline(always)]
-    fn sums(&self, cloud: &Cloud, ball: &Ball) -> Sums {
-        let mut sums = Sums([0.0; 15]);
-        let summands = |block: &Block, group: usize, weight: Eight, offset: [Eight; 3]| {
-            let [x, y, z] = offset;
-            let [wx, wy, wz] = [x * weight, y * weight, z * weight];
-            let [nx, ny, nz] = &block.normal;
-            [
-                weight,
-                wx,
-                wy,
-                wz,
-                wx * x,
-                wx * y,
-                wx * z,
-                wy * y,
-                wy * z,
-                wz * z,
-                Eight::of(nx, group) * weight,
-                Eight::of(ny, group) * weight,
-                Eight::of(nz, group) * weight,
-                Eight::of(&block.force, group) * weight,
-                Eight::of(&block.stiffness, group) * weight,
-            ]
+    /// Sums up what `ball` holds: each block by itself, and then all in their order, so that the number of threads changes
+    /// no bit.
+    fn sums(&mut self, cloud: &Cloud, ball: &Ball) -> Sums {
+        let mut of_blocks = std::mem::take(&mut self.of_blocks);
+        let blocks = cloud.blocks_of_link(ball.link);
+        of_blocks.resize(blocks.len(), [0.0; SUMS]);
+        let sum = |(at, sums): (usize, &mut [f64; SUMS])| {
+            let finder = &*self;
+            let of_link = cloud.block_of_link(ball.link, blocks.start + at);
+            *sums = self.processor.dispatch(OfBlock {
+                finder,
+                ball,
+                of_link,
+            });
         };
-        self.visit(cloud, ball, summands, 1, &mut sums.0);
-        sums
+        // From outside the pool, the way in would take longer.
+        match rayon::current_thread_index() {
+            Some(_) => (of_blocks.par_iter_mut().with_min_len(FEW).enumerate()).for_each(sum),
+            None => of_blocks.iter_mut().enumerate().for_each(sum),
+        }
+        let mut all = [0.0; SUMS];
+        for &sums in &of_blocks {
+            add(&mut all, sums);
+        }
+        self.of_blocks = of_blocks;
+        Sums(all)
     }
 
-    /// Adds up, over all that `ball` holds, what `summands` tells of eight particles: from block, group, weights and
-    /// offsets from the centre, m; every `stride` groups. Single precision within a block, double between them.
+    /// Adds up, over what `ball` holds of one block, what `summands` tells of eight particles: from group, weights and
+    /// offsets from the centre, m; every `stride` groups. Single precision here, double between the blocks.
     #[inline(always)]
     fn visit<const N: usize>(
         &self,
-        cloud: &Cloud,
         ball: &Ball,
-        summands: impl Fn(&Block, usize, Eight, [Eight; 3]) -> [Eight; N],
+        (block, range): (&Block, Range<usize>),
         stride: usize,
-        sums: &mut [f64; N],
-    ) {
-        for (block, range) in cloud.of_link(ball.link) {
-            let mut of_block = [Eight::ZERO; N];
-            for group in groups(&range).step_by(stride) {
-                let place = place(block, group);
-                let held = self.held(ball, &place, weights(block, group, &range));
-                if held.is_zero() {
-                    continue;
-                }
-                let summands = summands(block, group, held, ball.offset(&place));
-                for (sum, summand) in of_block.iter_mut().zip(summands) {
-                    *sum += summand;
-                }
+        summands: impl Fn(usize, Eight, [Eight; 3]) -> [Eight; N],
+    ) -> [f64; N] {
+        let mut sums = [Eight::ZERO; N];
+        for group in groups(&range).step_by(stride) {
+            let place = place(block, group);
+            let held = self.held(ball, &place, weights(block, group, &range));
+            if held.is_zero() {
+                continue;
             }
-            for (sum, of_block) in sums.iter_mut().zip(of_block) {
-                let of_block: f64 = of_block.0.into_iter().map(f64::from).sum();
-                *sum += of_block * block.scale;
+            let summands = summands(group, held, ball.offset(&place));
+            for (sum, summand) in sums.iter_mut().zip(summands) {
+                *sum += summand;
             }
         }
+        sums.map(|sum| sum.0.into_iter().map(f64::from).sum::<f64>() * block.scale)
     }
 
     /// The weights of those of eight particles of the ball's link that it holds, else zeros.
@@ -250,11 +252,54 @@ impl ModeFinder {
                 let place = place(block, group);
                 let held = self.held(ball, &place, weights(block, group, &range));
                 if !held.is_zero() {
-                    grid.add(place, held * (-block.scale as f32));
+                    grid.add(&place, held * (-block.scale as f32));
                 }
             }
         }
         self.grids[ball.link] = Some(grid);
+    }
+}
+
+/// The sums over what a ball holds of one block, compiled for each kind of processor that they may run on.
+struct OfBlock<'a> {
+    finder: &'a ModeFinder,
+    ball: &'a Ball,
+    of_link: (&'a Block, Range<usize>),
+}
+
+impl WithSimd for OfBlock<'_> {
+    type Output = [f64; SUMS];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> [f64; SUMS] {
+        let Self {
+            finder,
+            ball,
+            of_link: (block, range),
+        } = self;
+        let summands = |group: usize, weight: Eight, offset: [Eight; 3]| {
+            let [x, y, z] = offset;
+            let [wx, wy, wz] = [x * weight, y * weight, z * weight];
+            let [nx, ny, nz] = &block.normal;
+            [
+                weight,
+                wx,
+                wy,
+                wz,
+                wx * x,
+                wx * y,
+                wx * z,
+                wy * y,
+                wy * z,
+                wz * z,
+                Eight::of(nx, group) * weight,
+                Eight::of(ny, group) * weight,
+                Eight::of(nz, group) * weight,
+                Eight::of(&block.force, group) * weight,
+                Eight::of(&block.stiffness, group) * weight,
+            ]
+        };
+        finder.visit(ball, (block, range), 1, summands)
     }
 }
 
@@ -333,7 +378,18 @@ impl Ball {
 
 /// Weighted sums over particles: of the weight, the offset from a centre, its outer product, normal, force and
 /// stiffness.
-struct Sums([f64; 15]);
+struct Sums([f64; SUMS]);
+
+/// Number of sums over what a ball holds.
+const SUMS: usize = 15;
+/// Fewest blocks that are worth a thread of their own.
+const FEW: usize = 4;
+
+fn add<const N: usize>(sums: &mut [f64; N], summands: [f64; N]) {
+    for (sum, summand) in sums.iter_mut().zip(summands) {
+        *sum += summand;
+    }
+}
 
 impl Sums {
     fn mode(&self, ball: &Ball, skin: &Skin, kinematics: &Kinematics) -> Mode {
@@ -414,7 +470,7 @@ impl Grid {
 
     /// The cells of eight places.
     #[inline]
-    fn cells(&self, place: [Eight; 3]) -> [i32; 8] {
+    fn cells(&self, place: &[Eight; 3]) -> [i32; 8] {
         let place = place.map(|axis| f32x8::new(axis.0));
         let [x, y, z]: [f32x8; 3] = std::array::from_fn(|axis| {
             let along = (place[axis] - self.corner[axis] as f32) * (1.0 / CELL as f32);
@@ -425,15 +481,26 @@ impl Grid {
         cell.fast_trunc_int().to_array()
     }
 
-    #[inline]
-    fn add(&mut self, place: [Eight; 3], weights: Eight) {
-        for (cell, weight) in self.cells(place).into_iter().zip(weights.0) {
-            let (cell, weight) = (cell as usize, f64::from(weight));
-            if self.weight[cell] == 0.0 && weight > 0.0 {
-                self.occupied.push(cell);
+    #[inline(always)]
+    fn add(&mut self, place: &[Eight; 3], weights: Eight) {
+        let cells = self.cells(place);
+        if cells == [cells[0]; 8] {
+            // So that no addition waits for the one before to be stored.
+            self.put(cells[0], weights.0.into_iter().sum());
+        } else {
+            for (cell, weight) in cells.into_iter().zip(weights.0) {
+                self.put(cell, weight);
             }
-            self.weight[cell] += weight;
         }
+    }
+
+    #[inline]
+    fn put(&mut self, cell: i32, weight: f32) {
+        let (cell, weight) = (cell as usize, f64::from(weight));
+        if self.weight[cell] == 0.0 && weight > 0.0 {
+            self.occupied.push(cell);
+        }
+        self.weight[cell] += weight;
     }
 
     /// The largest weight of a cell with its 26 neighbours, and the cell's centre.
