@@ -90,6 +90,14 @@ impl Plate {
         at_corner + x * from_corner.x + y * from_corner.y + z * from_corner.z
     }
 
+    /// The height of a point, m, and whether its closest point is inside and no neighbour comes closer.
+    #[inline(always)]
+    pub(crate) fn inside(&self, query: &Vector3<f32>) -> (f32, bool) {
+        let seen = self.depths_and_height(query);
+        let height = seen.as_array()[3];
+        (height, self.is_clear(seen, height, height.abs(), 0b111))
+    }
+
     #[inline(always)]
     pub(crate) fn side(&self, query: &Vector3<f32>) -> Side {
         let seen = self.depths_and_height(query);

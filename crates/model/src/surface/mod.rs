@@ -1,5 +1,7 @@
 //! The surface of one link: closest points, by k-d tree and by walking downhill, and uniform samples.
 
+mod landing;
+
 use std::num::NonZeroUsize;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -9,9 +11,11 @@ use crate::TriangleMesh;
 use crate::adjacency::{Spoke, spokes_of, triangles_across_edges, triangles_around_vertices};
 use crate::bounds::Bounds;
 use crate::lists::Lists;
-use crate::plate::{OnEdge, Plate, Side};
+use crate::plate::Plate;
 use crate::rivals::Rivals;
 use crate::triangle::{Feature, NONE, Triangle};
+
+pub use landing::Landing;
 
 /// A point on a triangle of a [`Surface`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,19 +24,6 @@ pub struct SurfacePoint {
     pub point: Point3<f64>,
     /// Index of the triangle that it lies on.
     pub triangle: u32,
-}
-
-/// Where a point lands on a [`Surface`] when projected in single precision.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Landing {
-    /// The closest point, m.
-    pub point: Vector3<f32>,
-    /// Outward normal there.
-    pub normal: Vector3<f32>,
-    /// Index of the triangle that it lies on.
-    pub triangle: u32,
-    /// Distance from the query, m.
-    pub distance: f32,
 }
 
 /// A link's mesh, prepared for the questions that the filter asks.
@@ -174,134 +165,6 @@ impl Surface {
     /// the surface has another local minimum of the distance farther away.
     pub fn closest_point_from(&self, query: &Point3<f64>, start: u32) -> SurfacePoint {
         self.walk(query, self.nearest_on(query, start))
-    }
-
-    /// As [`Surface::closest_point_from`], in single precision where that can tell, for points that have moved a little:
-    /// across a few edges. The answer is as exact but for rounding, 0.1 µm on a link of a metre.
-    #[inline(always)]
-    pub fn land(&self, query: &Vector3<f32>, start: u32) -> Landing {
-        self.land_then(query, start, |landing| landing)
-    }
-
-    /// Does something with what [`Surface::land`] finds, which then need not go through memory.
-    #[inline(always)]
-    pub fn land_then<T>(
-        &self,
-        query: &Vector3<f32>,
-        start: u32,
-        take: impl FnOnce(Landing) -> T,
-    ) -> T {
-        const MOST: usize = 6;
-        let (mut triangle, mut before) = (start, NONE);
-        for _ in 0..MOST {
-            let plate = &self.plates[triangle as usize];
-            match plate.side(query) {
-                Side::Inside(height) => return take(plate.landing(query, triangle, height)),
-                Side::InReach => break,
-                Side::Beyond(edge) => {
-                    let beyond = plate.beyond(edge);
-                    if beyond == NONE {
-                        break;
-                    }
-                    if beyond == before {
-                        return take(self.land_on_edge(query, triangle, edge, start));
-                    }
-                    (before, triangle) = (triangle, beyond);
-                }
-            }
-        }
-        take(self.land_by_walk(query, start))
-    }
-
-    /// Where both triangles of an edge see the query beyond it.
-    #[inline(never)]
-    fn land_on_edge(
-        &self,
-        query: &Vector3<f32>,
-        triangle: u32,
-        edge: usize,
-        start: u32,
-    ) -> Landing {
-        let plate = &self.plates[triangle as usize];
-        let point = match plate.on_edge(edge, query) {
-            OnEdge::Between(point) => Some(point),
-            OnEdge::Beyond(corner) => self.on_corner(query, triangle, corner),
-            OnEdge::InReach => None,
-        };
-        let Some(point) = point else {
-            return self.land_by_walk(query, start);
-        };
-        Landing {
-            point,
-            normal: plate.normal(),
-            triangle,
-            distance: (query - point).norm(),
-        }
-    }
-
-    /// A corner of a triangle, if no point around it is closer to the query.
-    fn on_corner(
-        &self,
-        query: &Vector3<f32>,
-        triangle: u32,
-        corner: usize,
-    ) -> Option<Vector3<f32>> {
-        let plate = &self.plates[triangle as usize];
-        let point = plate.corner(corner);
-        let away = (query - point).cast();
-        let vertex = self.triangles[triangle as usize].vertices[corner];
-        let mut spokes = self.spokes.get(vertex as usize).iter();
-        let edges = 1 << corner | 1 << ((corner + 2) % 3);
-        let is_closest = spokes.all(|spoke| spoke.edge.dot(&away) <= 0.0)
-            && !plate.has_rivals(&point, query, edges);
-        is_closest.then_some(point)
-    }
-
-    #[inline(never)]
-    fn land_by_walk(&self, query: &Vector3<f32>, start: u32) -> Landing {
-        self.landing(
-            query,
-            self.closest_point_from(&Point3::from(query.cast()), start),
-        )
-    }
-
-    /// As [`Surface::land`] from the triangle with the nearest centroid. Allocates nothing.
-    pub fn land_anew(&self, query: &Vector3<f32>) -> Landing {
-        let at: Vector3<f64> = query.cast();
-        let nearest = (self.centroids.query(&[at.x, at.y, at.z]))
-            .nearest_one::<SquaredEuclidean<f64>>()
-            .execute();
-        self.land(query, nearest.item)
-    }
-
-    /// The closest point of the whole surface to `query`, given one that [`Surface::land`] has found: a walk does not see
-    /// a place far away that is closer. Allocates nothing.
-    #[inline(never)]
-    pub fn audit(&self, query: &Vector3<f32>, found: Landing) -> Landing {
-        let at = Point3::from(query.cast());
-        let mut closest = None;
-        let mut squared = f64::from(found.distance).powi(2);
-        self.bounds.visit(query, squared as f32, |triangle| {
-            let nearest = self.nearest_on(&at, triangle);
-            if nearest.squared < squared {
-                squared = nearest.squared;
-                closest = Some(SurfacePoint {
-                    point: nearest.point,
-                    triangle,
-                });
-            }
-            squared as f32
-        });
-        closest.map_or(found, |closest| self.landing(query, closest))
-    }
-
-    fn landing(&self, query: &Vector3<f32>, found: SurfacePoint) -> Landing {
-        Landing {
-            point: found.point.coords.cast(),
-            normal: self.plates[found.triangle as usize].normal(),
-            triangle: found.triangle,
-            distance: (found.point.coords - query.cast()).norm() as f32,
-        }
     }
 
     fn walk(&self, query: &Point3<f64>, start: Nearest) -> SurfacePoint {
@@ -547,7 +410,7 @@ mod tests {
     fn a_landing_is_as_close_as_the_walk() {
         for dent in [0.0, 0.03] {
             let surface = Surface::new(&ball(dent)).unwrap();
-            let (mut singles, mut others) = (0, 0);
+            let (mut singles, mut others, mut insides) = (0, 0, 0);
             for index in 0..2000 {
                 let start = surface.sample(uniform(index));
                 let normal = surface.normal(start.triangle).into_inner();
@@ -561,11 +424,15 @@ mod tests {
                 let apart = (found.point.cast::<f64>() - query.coords).norm();
                 others += u32::from((distance - exact).abs() > 1e-7);
                 assert!((apart - distance).abs() < 1e-7);
+                let (inside, is_inside) = surface.land_inside(&single, start.triangle);
+                assert!(!is_inside || inside == found);
+                insides += u32::from(is_inside);
                 // Their last bits tell them apart.
                 singles += u32::from(found != surface.land_by_walk(&single, start.triangle));
             }
             // Enough that single precision is what is tested.
             assert!(singles > 1000, "{singles}");
+            assert!((100..1900).contains(&insides), "{insides}");
             let most = if dent == 0.0 { 0 } else { 20 };
             assert!(others <= most, "{others}");
         }
