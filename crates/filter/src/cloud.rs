@@ -82,6 +82,16 @@ impl Block {
         self.triangle[at] = place.triangle;
     }
 
+    /// Where a particle landed, so far (m) from where it would have been.
+    pub(crate) fn landing(&self, at: usize, distance: f32) -> Landing {
+        Landing {
+            point: self.point(at),
+            normal: self.normal(at),
+            triangle: self.triangle[at],
+            distance,
+        }
+    }
+
     #[inline(always)]
     pub(crate) fn normal(&self, at: usize) -> Vector3<f32> {
         vector(&self.normal, at)

@@ -24,8 +24,8 @@ use crate::step::Step;
 
 use draws::Draws;
 use likelihood::LinkLikelihood;
-use motion::LinkMotion;
 pub use motion::MotionModel;
+use motion::{LinkMotion, Room};
 use offspring::{Generation, Nursery};
 pub use parameters::PaperParameters;
 use schedule::Level;
@@ -209,17 +209,16 @@ struct Pass<'a> {
 /// Room for what is needed of one block and no longer.
 struct Scratch {
     draws: Draws,
-    places: [Column; 3],
+    room: Room,
     errors: Column,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
-        let zero = [0.0; BLOCK];
         Self {
             draws: Draws::default(),
-            places: [zero; 3],
-            errors: zero,
+            room: Room::default(),
+            errors: [0.0; BLOCK],
         }
     }
 }
@@ -246,7 +245,7 @@ impl WithSimd for OfBlock<'_> {
         } = self;
         let Scratch {
             draws,
-            places,
+            room,
             errors,
         } = scratch;
         let number = pass.step.number;
@@ -256,8 +255,8 @@ impl WithSimd for OfBlock<'_> {
         );
         for Run { link, range } in Cloud::runs(pass.starts, index) {
             let surface = pass.step.skin.surface(link);
-            pass.motions[link].propagate(block, range.clone(), surface, draws, places);
-            pass.likelihoods[link].squared_errors(block, range, places, errors);
+            pass.motions[link].propagate(block, range.clone(), surface, draws, room);
+            pass.likelihoods[link].squared_errors(block, range, &mut room.places, errors);
         }
         let count = pass.starts.last().copied().unwrap_or(0);
         let held = (count - index * BLOCK).min(BLOCK);

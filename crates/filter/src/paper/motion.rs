@@ -67,8 +67,7 @@ impl LinkMotion {
         }
     }
 
-    /// Moves the particles of a run: the model, then noise on location, force and stiffness. `places` is room for where
-    /// they would be off the surface.
+    /// Moves the particles of a run: the model, then noise on location, force and stiffness.
     #[inline(always)]
     pub(super) fn propagate(
         &self,
@@ -76,7 +75,7 @@ impl LinkMotion {
         range: Range<usize>,
         surface: &Surface,
         draws: &Draws,
-        places: &mut [Column; 3],
+        room: &mut Room,
     ) {
         // So that the compiler knows that every index is within a column.
         let range = range.start..range.end.min(BLOCK);
@@ -87,14 +86,10 @@ impl LinkMotion {
                     block.set_point(at, &self.moved(block.point(at)));
                 }
             }
-            MotionModel::Curvature => self.roll(block, range.clone(), surface, draws, places),
+            MotionModel::Curvature => self.roll(block, range.clone(), surface, draws, room),
         }
-        scatter(block, range.clone(), draws, places);
-        for at in range.clone() {
-            let query = vector(places, at);
-            let start = block.triangle[at];
-            surface.land_then(&query, start, |landing| block.land(at, &landing));
-        }
+        scatter(block, range.clone(), draws, &mut room.places);
+        land(block, range.clone(), surface, room);
         for at in range {
             block.force[at] = (block.force[at] + draws.force[at]).clamp(0.0, MOST);
             block.stiffness[at] = (block.stiffness[at] * draws.stiffness[at]).min(MOST);
@@ -110,28 +105,66 @@ impl LinkMotion {
         range: Range<usize>,
         surface: &Surface,
         draws: &Draws,
-        centres: &mut [Column; 3],
+        room: &mut Room,
     ) {
         for at in range.clone() {
             let before = block.point(at) + block.normal(at) * draws.radius[at];
-            set_vector(centres, at, &self.moved(before));
+            set_vector(&mut room.places, at, &self.moved(before));
+        }
+        land(block, range.clone(), surface, room);
+        if range.contains(&self.audited) {
+            let at = self.audited;
+            let centre = vector(&room.places, at);
+            let touch = surface.audit(&centre, block.landing(at, room.distance[at]));
+            room.distance[at] = touch.distance;
+            block.land(at, &touch);
         }
         for at in range {
-            let centre = vector(centres, at);
-            let start = block.triangle[at];
-            surface.land_then(&centre, start, |mut touch| {
-                if at % AUDIT == self.audited {
-                    touch = surface.audit(&centre, touch);
-                }
-                block.force[at] += (draws.radius[at] - touch.distance) * block.stiffness[at];
-                block.land(at, &touch);
-            });
+            block.force[at] += (draws.radius[at] - room.distance[at]) * block.stiffness[at];
         }
     }
 
     #[inline(always)]
     fn moved(&self, point: Vector3<f32>) -> Vector3<f32> {
         point + (self.turn * point + self.shift)
+    }
+}
+
+/// Room for what is needed of one block while it moves.
+pub(super) struct Room {
+    /// Where the particles would be off the surface, m.
+    pub(super) places: [Column; 3],
+    /// How far that is from where they land, m.
+    distance: Column,
+}
+
+impl Default for Room {
+    fn default() -> Self {
+        Self {
+            places: [[0.0; BLOCK]; 3],
+            distance: [0.0; BLOCK],
+        }
+    }
+}
+
+/// Projects the places of a run on the surface: first all as if they stayed on their triangles, then those that do not.
+#[inline(always)]
+fn land(block: &mut Block, range: Range<usize>, surface: &Surface, room: &mut Room) {
+    let Room { places, distance } = room;
+    let (mut others, mut count) = ([0; BLOCK], 0);
+    for at in range {
+        let (landing, stays) = surface.land_inside(&vector(places, at), block.triangle[at]);
+        distance[at] = landing.distance;
+        block.land(at, &landing);
+        others[count.min(BLOCK - 1)] = at as u16;
+        count += usize::from(!stays);
+    }
+    for &at in &others[..count.min(BLOCK)] {
+        let at = usize::from(at).min(BLOCK - 1);
+        surface.land_then(&vector(places, at), block.triangle[at], |landing| {
+            distance[at] = landing.distance;
+            block.land(at, &landing);
+        });
     }
 }
 

@@ -98,7 +98,7 @@ impl WithSimd for Weigh<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Scratch { places, errors, .. } = self.scratch;
-        (self.likelihood).squared_errors(self.block, self.range, places, errors);
+        let Scratch { room, errors, .. } = self.scratch;
+        (self.likelihood).squared_errors(self.block, self.range, &mut room.places, errors);
     }
 }
