@@ -6,7 +6,6 @@ use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use palpate_model::{Kinematics, Robot};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
-
 use wide::f32x8;
 
 use crate::Mode;

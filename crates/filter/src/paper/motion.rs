@@ -24,9 +24,6 @@ pub enum MotionModel {
     World,
 }
 
-/// One particle in so many is projected on the whole surface each step, in turn: a walk from the last triangle does not see a place far
-/// away that is closer.
-const AUDIT: usize = 256;
 /// Forces (N) and stiffnesses (N/m) stay below this, whatever the noise.
 const MOST: f32 = 1e9;
 
@@ -38,7 +35,8 @@ pub(super) struct LinkMotion {
     /// precision rounds the motion and not the place.
     turn: Matrix3<f32>,
     shift: Vector3<f32>,
-    /// Which particles of a block are audited in this step.
+    /// Which particle of each block is audited in this step, in turn: projected on the whole surface, as a walk from the
+    /// last triangle does not see a place far away that is closer.
     audited: usize,
 }
 
@@ -63,7 +61,7 @@ impl LinkMotion {
             model,
             turn: (turn.into_inner() - Matrix3::identity()).cast(),
             shift: now_from_before.translation.vector.cast(),
-            audited: (step.number % AUDIT as u64) as usize,
+            audited: (step.number % BLOCK as u64) as usize,
         }
     }
 
