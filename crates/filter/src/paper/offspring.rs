@@ -101,10 +101,13 @@ impl Generation {
         for &start in &parents.starts {
             let before = self.before(parents, start) / sum.max(f64::MIN_POSITIVE);
             let teeth = (before * children as f64 - self.offset).ceil().max(0.0) as usize;
-            self.children.push(teeth.min(children));
-        }
-        if let Some(end) = self.children.last_mut() {
-            *end = children;
+            // After the last parent comes no child, however the sums were rounded: links that end the list empty get none.
+            let is_end = start == parents.len();
+            self.children.push(if is_end {
+                children
+            } else {
+                teeth.min(children)
+            });
         }
     }
 
