@@ -31,6 +31,14 @@ fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// The finaliser of MurmurHash3 (Appleby 2008), which maps numbers one to one.
+#[inline(always)]
+fn mix_32(mut z: u32) -> u32 {
+    z = (z ^ (z >> 16)).wrapping_mul(0x85eb_ca6b);
+    z = (z ^ (z >> 13)).wrapping_mul(0xc2b2_ae35);
+    z ^ (z >> 16)
+}
+
 /// Generators in one [`Bundle`]: enough that their loops stay loops, which compilers turn into vector instructions.
 const LANES: usize = 32;
 
@@ -39,14 +47,17 @@ const LANES: usize = 32;
 pub(crate) struct Bundle([[u32; LANES]; 4]);
 
 impl Bundle {
-    /// Unrelated generators.
+    /// Generators with nothing in common: the words of their states are mixed from successive numbers.
+    #[inline(always)]
     pub(crate) fn new(random: &mut impl Rng) -> Self {
-        let mut state = [[0; LANES]; 4];
-        for pair in state.as_flattened_mut().as_chunks_mut::<2>().0 {
-            let both = random.next_u64();
-            *pair = [both as u32, (both >> 32) as u32];
+        let mut states = [[0; LANES]; 4];
+        for words in &mut states {
+            let key = random.next_u32();
+            for (lane, word) in words.iter_mut().enumerate() {
+                *word = mix_32(key.wrapping_add(lane as u32));
+            }
         }
-        Self(state)
+        Self(states)
     }
 
     /// Fills a column with random bits.

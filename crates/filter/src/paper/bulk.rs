@@ -13,18 +13,8 @@ pub(super) fn exp(x: f32) -> f32 {
     let rounded = power + ROUND;
     let rest = (power - (rounded - ROUND)) * LN_2;
     // Taylor's series for |rest| ≤ ln 2 / 2.
-    let series = [
-        1.0 / 720.0,
-        1.0 / 120.0,
-        1.0 / 24.0,
-        1.0 / 6.0,
-        0.5,
-        1.0,
-        1.0,
-    ]
-    .into_iter()
-    .reduce(|sum, term| sum * rest + term)
-    .unwrap_or(1.0);
+    let series = 1.0 / 6.0 + rest * (1.0 / 24.0 + rest * (1.0 / 120.0 + rest * (1.0 / 720.0)));
+    let series = 1.0 + rest * (1.0 + rest * (0.5 + rest * series));
     let exponent = rounded.to_bits().wrapping_sub(ROUND.to_bits());
     f32::from_bits(series.to_bits().wrapping_add(exponent << 23))
 }
@@ -57,8 +47,8 @@ pub(super) fn normals(length_bits: u32, angle_bits: u32) -> (f32, f32) {
     // An angle within an eighth of a turn to both sides of an axis, then any of the four axes.
     let angle = (uniform(angle_bits) - 0.5) * FRAC_PI_2;
     let a2 = angle * angle;
-    let sin = angle * (1.0 - a2 * (1.0 / 6.0 - a2 * (1.0 / 120.0 - a2 / 5040.0)));
-    let cos = 1.0 - a2 * (0.5 - a2 * (1.0 / 24.0 - a2 * (1.0 / 720.0 - a2 / 40_320.0)));
+    let sin = angle * (1.0 - a2 * (1.0 / 6.0 - a2 * (1.0 / 120.0 - a2 * (1.0 / 5040.0))));
+    let cos = 1.0 - a2 * (0.5 - a2 * (1.0 / 24.0 - a2 * (1.0 / 720.0 - a2 * (1.0 / 40_320.0))));
     let sign = f32::from_bits(1.0_f32.to_bits() | (angle_bits << 31));
     let (first, second) = match angle_bits & 2 {
         0 => (sin, cos * sign),

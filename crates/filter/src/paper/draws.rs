@@ -42,17 +42,20 @@ impl Draws {
     #[inline(always)]
     pub(super) fn draw(&mut self, level: &Level, random: &mut impl Rng) {
         let mut random = Bundle::new(random);
-        let [location_1, location_2] = &mut self.location;
-        draw_normals(&mut random, &mut self.bits, [location_1, location_2]);
-        scale(location_1, level.location_noise);
-        scale(location_2, level.location_noise);
-        let [force, stiffness] = [&mut self.force, &mut self.stiffness];
-        draw_normals(&mut random, &mut self.bits, [force, stiffness]);
-        scale(force, level.force_noise);
-        let stiffness_noise = level.stiffness_noise as f32;
-        for value in stiffness {
-            *value = exp(*value * stiffness_noise);
-        }
+        let [location_noise, force_noise, stiffness_noise] = [
+            level.location_noise,
+            level.force_noise,
+            level.stiffness_noise,
+        ]
+        .map(|noise| noise as f32);
+        let along_surface = self.location.each_mut();
+        draw_normals(&mut random, &mut self.bits, along_surface, |one, other| {
+            (one * location_noise, other * location_noise)
+        });
+        let columns = [&mut self.force, &mut self.stiffness];
+        draw_normals(&mut random, &mut self.bits, columns, |one, other| {
+            (one * force_noise, exp(other * stiffness_noise))
+        });
         let [least, most] = RADIUS_RANGE.map(f32::ln);
         random.fill(&mut self.bits[0]);
         for (radius, &bits) in self.radius.iter_mut().zip(&self.bits[0]) {
@@ -61,25 +64,21 @@ impl Draws {
     }
 }
 
-#[inline(always)]
-fn scale(column: &mut Column, noise: f64) {
-    let noise = noise as f32;
-    column.iter_mut().for_each(|value| *value *= noise);
-}
-
-/// Two columns of standard normal numbers.
+/// Two columns of what is made of two standard normal numbers.
 #[inline(always)]
 fn draw_normals(
     random: &mut Bundle,
     bits: &mut [[u32; BLOCK]; 2],
     [first, second]: [&mut Column; 2],
+    make: impl Fn(f32, f32) -> (f32, f32),
 ) {
     random.fill(&mut bits[0]);
     random.fill(&mut bits[1]);
     let [lengths, angles] = bits;
     let columns = first.iter_mut().zip(second);
     for ((first, second), (&length, &angle)) in columns.zip(lengths.iter().zip(&*angles)) {
-        (*first, *second) = normals(length, angle);
+        let (one, other) = normals(length, angle);
+        (*first, *second) = make(one, other);
     }
 }
 
@@ -107,7 +106,10 @@ mod tests {
         let columns = |block| {
             let mut columns = [[0.0; BLOCK]; 2];
             let [first, second] = &mut columns;
-            draw_normals(&mut bundle(block), &mut [[0; BLOCK]; 2], [first, second]);
+            let mut bits = [[0; BLOCK]; 2];
+            draw_normals(&mut bundle(block), &mut bits, [first, second], |a, b| {
+                (a, b)
+            });
             columns.to_vec()
         };
         let [mean, variance, skew, kurtosis] = moments(columns);
