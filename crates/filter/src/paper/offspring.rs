@@ -18,11 +18,15 @@ use crate::skin::Skin;
 /// Relative spread of a fresh particle's force about the one that fits best.
 const FORCE_SPREAD: f64 = 0.2;
 
+/// Parents in one strip: sums of weights before each tell where to look for the parents of a block of children.
+const STRIP: usize = 32;
+const STRIPS: usize = BLOCK / STRIP;
+
 /// Who the parents are, where the children go.
 #[derive(Default)]
 pub(super) struct Generation {
-    /// Sum of the weights before each block, and of all.
-    before_block: Vec<f64>,
+    /// Sum of the weights before each strip, and of all.
+    before_strip: Vec<f64>,
     /// Number of children before each link, and of all.
     children: Vec<usize>,
     /// Place of the systematic comb, in teeth: 0 … 1.
@@ -42,7 +46,7 @@ impl Generation {
     /// Room for the parents that `cloud` has room for.
     pub(super) fn new(cloud: &Cloud) -> Self {
         Self {
-            before_block: Vec::with_capacity(cloud.blocks.len() + 1),
+            before_strip: Vec::with_capacity(cloud.blocks.len() * STRIPS + 1),
             children: Vec::with_capacity(cloud.starts.len()),
             offset: 0.0,
         }
@@ -89,13 +93,14 @@ impl Generation {
     /// Sums the parents' weights, and shares the children out between the links.
     fn count_children(&mut self, parents: &Cloud, children: usize) {
         let mut sum = 0.0;
-        self.before_block.clear();
-        self.before_block.push(sum);
-        let blocks = parents.len().div_ceil(BLOCK);
-        for (index, block) in parents.blocks[..blocks].iter().enumerate() {
-            let held = (parents.len() - index * BLOCK).min(BLOCK);
-            sum += sum_of(&block.weight[..held]) * block.scale;
-            self.before_block.push(sum);
+        self.before_strip.clear();
+        self.before_strip.push(sum);
+        for block in &parents.blocks[..parents.len().div_ceil(BLOCK)] {
+            // Places after the last parent weigh nothing.
+            for weights in block.weight.as_chunks::<STRIP>().0 {
+                sum += sum_of(weights) * block.scale;
+                self.before_strip.push(sum);
+            }
         }
         self.children.clear();
         for &start in &parents.starts {
@@ -113,16 +118,17 @@ impl Generation {
 
     /// Sum of the weights of the parents before this one.
     fn before(&self, parents: &Cloud, index: usize) -> f64 {
-        let (block, at) = (index / BLOCK, index % BLOCK);
         if index == parents.len() {
             return self.total();
         }
-        let within = (0..at).map(|at| weight(&parents.blocks[block], at));
-        within.fold(self.before_block[block], |sum, weight| sum + weight)
+        let (block, at) = (&parents.blocks[index / BLOCK], index % BLOCK);
+        let within = &block.weight[at / STRIP * STRIP..at];
+        let sum: f64 = within.iter().map(|&weight| f64::from(weight)).sum();
+        self.before_strip[index / STRIP] + sum * block.scale
     }
 
     fn total(&self) -> f64 {
-        self.before_block.last().copied().unwrap_or(0.0)
+        self.before_strip.last().copied().unwrap_or(0.0)
     }
 
     /// The parents of at most [`BLOCK`] successive children, of which `first` is the number of the first: of each the
@@ -135,23 +141,25 @@ impl Generation {
         first: usize,
         children: usize,
     ) -> impl Iterator<Item = u32> {
-        let mut places = [0; BLOCK + 1];
+        let mut places = [0; 2 * BLOCK];
         let teeth = self.children.last().copied().unwrap_or(0) as f64;
         let per_weight = teeth / self.total().max(f64::MIN_POSITIVE);
         let before = first as f64 + self.offset;
-        let ends = &self.before_block[1..];
+        let ends = &self.before_strip[1..];
         let begin = ends.partition_point(|&end| end * per_weight < before);
         let mut next = 0;
-        for index in begin.min(ends.len().saturating_sub(1))..ends.len() {
+        for strip in begin.min(ends.len().saturating_sub(1))..ends.len() {
             if next == children {
                 break;
             }
-            let block = &parents.blocks[index];
-            let mut sum = self.before_block[index];
-            for at in 0..BLOCK {
-                places[next] = (index * BLOCK + at) as u32;
-                sum += weight(block, at);
-                next = ((sum * per_weight - before + 1.0) as usize).min(children);
+            let block = &parents.blocks[strip / STRIPS];
+            let scale = block.scale * per_weight;
+            let mut sum = self.before_strip[strip] * per_weight - before;
+            let weights = &block.weight.as_chunks::<STRIP>().0[strip % STRIPS];
+            for (at, &weight) in weights.iter().enumerate() {
+                places[next % places.len()] = (strip * STRIP + at) as u32;
+                sum += f64::from(weight) * scale;
+                next = teeth_within(sum, children as f64);
             }
         }
         let latest = |parent: &mut u32, at: u32| {
@@ -188,21 +196,27 @@ impl Generation {
     }
 }
 
+/// How many of the teeth 0, 1, 2 and so on a length reaches, at most so many, which is a whole number: ⌊length⌋ + 1, by a
+/// few instructions. Casts, minima and maxima that care about what is no number take many.
+#[inline(always)]
+fn teeth_within(length: f64, most: f64) -> usize {
+    /// Adding this rounds to a whole number, which then stands in the lowest bits of the sum.
+    const ROUND: f64 = 4_503_599_627_370_496.0;
+    let count = length + 0.5;
+    let count = if count > 0.0 { count } else { 0.0 };
+    let count = if count < most { count } else { most };
+    (count + ROUND).to_bits() as u32 as usize
+}
+
 /// In several parts, so that they can be added side by side.
-fn sum_of(weights: &[f32]) -> f64 {
-    let (lanes, rest) = weights.as_chunks::<8>();
+fn sum_of(weights: &[f32; STRIP]) -> f64 {
     let mut sums = [0.0; 8];
-    for lane in lanes {
+    for lane in weights.as_chunks::<8>().0 {
         for (sum, &weight) in sums.iter_mut().zip(lane) {
             *sum += f64::from(weight);
         }
     }
-    let rest = rest.iter().map(|&weight| f64::from(weight));
-    sums.into_iter().chain(rest).sum()
-}
-
-fn weight(block: &Block, at: usize) -> f64 {
-    f64::from(block.weight[at]) * block.scale
+    sums.into_iter().sum()
 }
 
 impl Nursery<'_> {
