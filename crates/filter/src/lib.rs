@@ -3,7 +3,6 @@
 mod cloud;
 mod detection;
 mod detector;
-mod eight;
 mod estimate;
 mod filter;
 mod intake;
