@@ -55,4 +55,4 @@ pub use robot::{Joint, JointKind, JointLimits, Link, Robot};
 pub use sample::{JointSample, MeasuredSample};
 pub use smooth::{SmoothBody, SmoothPoint};
 pub use source::{Fields, JointPicker, JointReading, JointValues, Source};
-pub use surface::{Landing, Surface, SurfacePoint};
+pub use surface::{Landing, Plates, Surface, SurfacePoint};

@@ -13,14 +13,16 @@ use crate::triangle::Triangle;
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(crate) struct Plate {
-    corner: Vector3<f32>,
-    /// From the corner to the next one and to the last one.
-    edges: [Vector3<f32>; 2],
     /// Gradients of the depths inside of the three edges, which sum to one, and of the height, side by side: their x, y
     /// and z.
     gradients: [f32x4; 3],
-    /// Greatest tan(φ / 2) beyond each edge, in units of the depths: above and below.
+    /// Depths and height of the frame's origin.
+    at_origin: f32x4,
+    /// Greatest tan(φ / 2) beyond each edge, in units of the depths: above, and below with a minus. Last a one, by which
+    /// the height is as great as it has to be.
     steepest: [f32x4; 2],
+    /// What a unit of the depths is, m; zero for the height.
+    units: f32x4,
     across: [u32; 3],
 }
 
@@ -30,19 +32,22 @@ pub(crate) enum Side {
     Inside(f32),
     /// It is beyond this edge.
     Beyond(usize),
-    /// A neighbour that rises may be closer.
-    InReach,
+    /// Its closest point is inside, at this height, unless a neighbour that rises is closer.
+    InReach(f32),
 }
 
 /// The closest point on the line of an edge.
 pub(crate) enum OnEdge {
-    /// It is between the edge's ends, and no neighbour comes closer.
+    /// It is between the edge's ends.
     Between(Vector3<f32>),
     /// It is beyond this corner of the triangle.
     Beyond(usize),
-    /// A neighbour that rises may be closer.
-    InReach,
 }
+
+/// All edges, a bit each.
+const EDGES: u32 = 0b111;
+/// All edges, and the height.
+const ALL: u32 = 0b1111;
 
 impl Plate {
     /// For a triangle, given the greatest tan(φ / 2) beyond its edges above and below in units of
@@ -57,12 +62,20 @@ impl Plate {
         let (u, v) = (dual.row(0).transpose(), dual.row(1).transpose());
         let gradients = [v, -u - v, u, normal];
         let sum: f64 = triangle.depths(&corners[0]).iter().sum();
-        let side = |[a, b, c]: [f64; 3]| [a, b, c, 0.0].map(|tangent| (tangent / sum) as f32);
+        let side = |tangents: [f64; 3], sign: f64| {
+            let [a, b, c] = tangents.map(|tangent| (sign * tangent / sum) as f32);
+            f32x4::new([a, b, c, 1.0])
+        };
+        let [above, below] = steepest;
+        let mut at_origin = gradients.map(|gradient| -gradient.dot(&corners[0].coords));
+        let unit = |gradient: Vector3<f64>| (1.0 / gradient.norm().max(f64::MIN_POSITIVE)) as f32;
+        // The corner's depth inside of the edge across.
+        at_origin[1] += 1.0;
         Self {
-            corner: corners[0].coords.cast(),
-            edges: edges.map(|edge| edge.cast()),
+            at_origin: at_origin.map(|part| part as f32).into(),
             gradients: [0, 1, 2].map(|axis| gradients.map(|part| part[axis] as f32).into()),
-            steepest: steepest.map(|tangents| side(tangents).into()),
+            steepest: [side(above, 1.0), side(below, -1.0)],
+            units: f32x4::new([unit(v), unit(u + v), unit(u), 0.0]),
             across: triangle.across,
         }
     }
@@ -72,30 +85,27 @@ impl Plate {
         Vector3::from(self.gradients.each_ref().map(|axis| axis.as_array()[3]))
     }
 
-    /// One of the triangle's corners, m.
-    #[inline]
-    pub(crate) fn corner(&self, corner: usize) -> Vector3<f32> {
-        match corner {
-            0 => self.corner,
-            _ => self.corner + self.edges[corner - 1],
-        }
-    }
-
     /// How far inside of each edge a point is, seen along the normal: the depths sum to one. Last its height, m.
     #[inline(always)]
     fn depths_and_height(&self, point: &Vector3<f32>) -> f32x4 {
-        let at_corner = f32x4::new([0.0, 1.0, 0.0, 0.0]);
-        let from_corner = point - self.corner;
         let [x, y, z] = self.gradients;
-        at_corner + x * from_corner.x + y * from_corner.y + z * from_corner.z
+        self.at_origin + x * point.x + y * point.y + z * point.z
     }
 
     /// The height of a point, m, and whether its closest point is inside and no neighbour comes closer.
     #[inline(always)]
-    pub(crate) fn inside(&self, query: &Vector3<f32>) -> (f32, bool) {
+    pub(crate) fn height_over(&self, query: &Vector3<f32>) -> (f32, bool) {
         let seen = self.depths_and_height(query);
         let height = seen.as_array()[3];
-        (height, self.is_clear(seen, height, height.abs(), 0b111))
+        (height, self.clear(seen, height) == ALL)
+    }
+
+    /// Whether a point of the plane is inside.
+    #[inline(always)]
+    pub(crate) fn holds(&self, point: &Vector3<f32>) -> bool {
+        const LEAST: f32x4 = f32x4::new([0.0, 0.0, 0.0, f32::NEG_INFINITY]);
+        let seen = self.depths_and_height(point);
+        seen.simd_ge(LEAST).to_bitmask() == ALL
     }
 
     #[inline(always)]
@@ -103,7 +113,7 @@ impl Plate {
         let seen = self.depths_and_height(query);
         let [first, second, third, height] = seen.to_array();
         // All edges at once: which one it is cannot be predicted.
-        if self.is_clear(seen, height, height.abs(), 0b111) {
+        if self.clear(seen, height) == ALL {
             return Side::Inside(height);
         }
         let depths = [first, second, third];
@@ -111,16 +121,29 @@ impl Plate {
         let farthest = if third < depths[farther] { 2 } else { farther };
         match depths[farthest] < 0.0 {
             true => Side::Beyond(farthest),
-            false => Side::InReach,
+            false => Side::InReach(height),
         }
     }
 
-    /// Whether a point is so deep inside of each of these edges (a bit each) that no neighbour comes closer to a point
-    /// at this distance, above or below.
+    /// Of which edges (a bit each) a point is so deep inside that no neighbour beyond them comes closer to a point at this
+    /// distance: above, or below with a minus.
     #[inline(always)]
-    fn is_clear(&self, depths: f32x4, height: f32, distance: f32, edges: u32) -> bool {
-        let least = self.steepest[usize::from(height < 0.0)] * distance;
-        depths.simd_ge(least).to_bitmask() & edges == edges
+    fn clear(&self, depths: f32x4, distance: f32) -> u32 {
+        let [above, below] = self.steepest;
+        // One of them is not positive.
+        let least = (above * distance).fast_max(below * distance);
+        depths.simd_ge(least).to_bitmask()
+    }
+
+    /// No point of the triangle is closer than this, m², and whether one is as close: straight below.
+    #[inline(always)]
+    pub(crate) fn bound_squared(&self, query: &Vector3<f32>) -> (f32, bool) {
+        let seen = self.depths_and_height(query);
+        let [first, second, third, _] = (seen * self.units).to_array();
+        let height = seen.as_array()[3];
+        let deepest = first.min(second).min(third);
+        let beyond = deepest.min(0.0);
+        (height * height + beyond * beyond, deepest >= 0.0)
     }
 
     /// The triangle across an edge; [`NONE`] at a rim.
@@ -141,9 +164,13 @@ impl Plate {
         }
     }
 
-    /// The point of an edge that is closest to a query beyond it.
-    pub(crate) fn on_edge(&self, edge: usize, query: &Vector3<f32>) -> OnEdge {
-        let (from, to) = (self.corner(edge), self.corner((edge + 1) % 3));
+    /// The point of an edge that is closest to a query beyond it, given the edge's ends, m.
+    pub(crate) fn on_edge(
+        &self,
+        edge: usize,
+        [from, to]: [Vector3<f32>; 2],
+        query: &Vector3<f32>,
+    ) -> OnEdge {
         let way = to - from;
         let share = way.dot(&(query - from)) / way.norm_squared();
         if share <= 0.0 {
@@ -152,11 +179,7 @@ impl Plate {
         if share >= 1.0 {
             return OnEdge::Beyond((edge + 1) % 3);
         }
-        let point = from + way * share;
-        match self.has_rivals(&point, query, 1 << edge) {
-            true => OnEdge::InReach,
-            false => OnEdge::Between(point),
-        }
+        OnEdge::Between(from + way * share)
     }
 
     /// Whether a neighbour that rises may be closer to a query than a point on some of the triangle's edges (a bit
@@ -164,10 +187,14 @@ impl Plate {
     pub(crate) fn has_rivals(&self, point: &Vector3<f32>, query: &Vector3<f32>, on: u32) -> bool {
         let away = query - point;
         let height = self.normal().dot(&away);
-        let steepest = self.steepest[usize::from(height < 0.0)];
+        let steepest = match height < 0.0 {
+            true => -self.steepest[1],
+            false => self.steepest[0],
+        };
         let depths = self.depths_and_height(point);
         // On an edge the depth is zero, but for rounding.
         let rise = steepest.simd_gt(f32x4::ZERO).to_bitmask() & on != 0;
-        rise || !self.is_clear(depths, height, away.norm(), 0b111 & !on)
+        let clear = self.clear(depths, away.norm().copysign(height));
+        rise || (clear | on) & EDGES != EDGES
     }
 }

@@ -76,6 +76,11 @@ impl Rivals {
             false => &[],
         }
     }
+
+    /// All those around a triangle that rise above or fall below it.
+    pub(crate) fn all(&self, index: u32, below: bool) -> &[u32] {
+        self.triangles.get(2 * index as usize + usize::from(below))
+    }
 }
 
 /// Beyond which edge of `triangle` another one rises, and tan(φ / 2) for it. Where it only shares a corner, two edges

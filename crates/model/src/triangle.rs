@@ -48,6 +48,15 @@ impl Triangle {
         self.corner + self.edge_1 * along_1 + self.edge_2 * along_2
     }
 
+    /// Corner 0, 1 or 2.
+    pub(crate) fn corner(&self, index: usize) -> Point3<f64> {
+        match index {
+            0 => self.corner,
+            1 => self.corner + self.edge_1,
+            _ => self.corner + self.edge_2,
+        }
+    }
+
     pub(crate) fn centroid(&self) -> Point3<f64> {
         self.at(1.0 / 3.0, 1.0 / 3.0)
     }

@@ -81,13 +81,13 @@ impl LinkMotion {
             MotionModel::Link => {}
             MotionModel::World => {
                 for at in range.clone() {
-                    block.set_point(at, &self.moved(block.point(at)));
+                    set_vector(&mut room.places, at, &self.moved(block.point(at)));
                 }
+                land(block, range.clone(), surface, room);
             }
             MotionModel::Curvature => self.roll(block, range.clone(), surface, draws, room),
         }
-        scatter(block, range.clone(), draws, &mut room.places);
-        land(block, range.clone(), surface, room);
+        scatter(block, range.clone(), surface, draws, room);
         for at in range {
             block.force[at] = (block.force[at] + draws.force[at]).clamp(0.0, MOST);
             block.stiffness[at] = (block.stiffness[at] * draws.stiffness[at]).min(MOST);
@@ -106,8 +106,8 @@ impl LinkMotion {
         room: &mut Room,
     ) {
         for at in range.clone() {
-            let before = block.point(at) + block.normal(at) * draws.radius[at];
-            set_vector(&mut room.places, at, &self.moved(before));
+            let centre = block.point(at) + block.normal(at) * draws.radius[at];
+            set_vector(&mut room.places, at, &self.moved(centre));
         }
         land(block, range.clone(), surface, room);
         if range.contains(&self.audited) {
@@ -132,6 +132,8 @@ impl LinkMotion {
 pub(super) struct Room {
     /// Where the particles would be off the surface, m.
     pub(super) places: [Column; 3],
+    /// How high that is over their triangles' planes, m.
+    height: Column,
     /// How far that is from where they land, m.
     distance: Column,
 }
@@ -140,25 +142,58 @@ impl Default for Room {
     fn default() -> Self {
         Self {
             places: [[0.0; BLOCK]; 3],
+            height: [0.0; BLOCK],
             distance: [0.0; BLOCK],
         }
     }
 }
 
-/// Projects the places of a run on the surface: first all as if they stayed on their triangles, then those that do not.
+/// Particles of a block that have left their triangles.
+struct Leavers {
+    indices: [u8; BLOCK],
+    count: usize,
+}
+
+impl Leavers {
+    /// Those of a run for which `stays` is false, without a branch on it.
+    #[inline(always)]
+    fn of(range: Range<usize>, mut stays: impl FnMut(usize) -> bool) -> Self {
+        let (mut indices, mut count) = ([0; BLOCK], 0);
+        for at in range {
+            indices[count % BLOCK] = at as u8;
+            count += usize::from(!stays(at));
+        }
+        Self { indices, count }
+    }
+
+    #[inline(always)]
+    fn each(&self) -> impl Iterator<Item = usize> {
+        let left = &self.indices[..self.count.min(BLOCK)];
+        left.iter().map(|&at| usize::from(at))
+    }
+}
+
+/// Projects the places of a run on the surface: first all as if they stayed on their triangles, and so kept their
+/// normals, then those that do not.
 #[inline(always)]
 fn land(block: &mut Block, range: Range<usize>, surface: &Surface, room: &mut Room) {
-    let Room { places, distance } = room;
-    let (mut others, mut count) = ([0; BLOCK], 0);
+    let Room {
+        places,
+        height,
+        distance,
+    } = room;
+    let plates = surface.plates();
+    let leavers = Leavers::of(range.clone(), |at| {
+        let (over, stays) = plates.height_over(block.triangle[at], &vector(places, at));
+        height[at] = over;
+        stays
+    });
     for at in range {
-        let (landing, stays) = surface.land_inside(&vector(places, at), block.triangle[at]);
-        distance[at] = landing.distance;
-        block.land(at, &landing);
-        others[count.min(BLOCK - 1)] = at as u16;
-        count += usize::from(!stays);
+        let point = vector(places, at) - block.normal(at) * height[at];
+        block.set_point(at, &point);
+        distance[at] = height[at].abs();
     }
-    for &at in &others[..count.min(BLOCK)] {
-        let at = usize::from(at).min(BLOCK - 1);
+    for at in leavers.each() {
         surface.land_then(&vector(places, at), block.triangle[at], |landing| {
             distance[at] = landing.distance;
             block.land(at, &landing);
@@ -166,13 +201,33 @@ fn land(block: &mut Block, range: Range<usize>, surface: &Surface, room: &mut Ro
     }
 }
 
-/// The points with noise along the surface, m: noise along the normal would be undone by the projection.
+/// Adds noise along the surface, m: noise along the normal would be undone by the projection, and what stays on its
+/// triangle needs none.
 #[inline(always)]
-fn scatter(block: &Block, range: Range<usize>, draws: &Draws, places: &mut [Column; 3]) {
-    for at in range {
+fn scatter(
+    block: &mut Block,
+    range: Range<usize>,
+    surface: &Surface,
+    draws: &Draws,
+    room: &mut Room,
+) {
+    let places = &mut room.places;
+    for at in range.clone() {
         let [along, across] = tangents(&block.normal(at));
         let noise = along * draws.location[0][at] + across * draws.location[1][at];
         set_vector(places, at, &(block.point(at) + noise));
+    }
+    let plates = surface.plates();
+    let leavers = Leavers::of(range.clone(), |at| {
+        plates.holds(block.triangle[at], &vector(places, at))
+    });
+    for at in range {
+        block.set_point(at, &vector(places, at));
+    }
+    for at in leavers.each() {
+        surface.land_then(&vector(places, at), block.triangle[at], |landing| {
+            block.land(at, &landing);
+        });
     }
 }
 

@@ -5,7 +5,7 @@ use kiddo::SquaredEuclidean;
 use nalgebra::{Point3, Vector3};
 
 use super::{Surface, SurfacePoint};
-use crate::plate::{OnEdge, Side};
+use crate::plate::{OnEdge, Plate, Side};
 use crate::triangle::NONE;
 
 /// Where a point lands on a [`Surface`] when projected in single precision.
@@ -21,6 +21,25 @@ pub struct Landing {
     pub distance: f32,
 }
 
+/// The triangles of a [`Surface`], each by itself.
+#[derive(Clone, Copy)]
+pub struct Plates<'a>(&'a [Plate]);
+
+impl Plates<'_> {
+    /// The height of a point over a triangle's plane, m, and whether the closest point is straight below it, inside the
+    /// triangle, as [`Surface::land`] from there would find it. Without a branch on the answer, which nothing could predict.
+    #[inline(always)]
+    pub fn height_over(self, triangle: u32, query: &Vector3<f32>) -> (f32, bool) {
+        self.0[triangle as usize].height_over(query)
+    }
+
+    /// Whether a point in the plane of a triangle is on it.
+    #[inline(always)]
+    pub fn holds(self, triangle: u32, point: &Vector3<f32>) -> bool {
+        self.0[triangle as usize].holds(point)
+    }
+}
+
 impl Surface {
     /// As [`Surface::closest_point_from`], in single precision where that can tell, for points that have moved a little:
     /// across a few edges. The answer is as exact but for rounding, 0.1 µm on a link of a metre.
@@ -29,13 +48,10 @@ impl Surface {
         self.land_then(query, start, |landing| landing)
     }
 
-    /// Where [`Surface::land`] finds the closest point if that is inside the triangle `start`, and whether it is. Without
-    /// a branch on the answer, which nothing could predict.
+    /// The triangles, each by itself: for many questions one after the other.
     #[inline(always)]
-    pub fn land_inside(&self, query: &Vector3<f32>, start: u32) -> (Landing, bool) {
-        let plate = &self.plates[start as usize];
-        let (height, is_inside) = plate.inside(query);
-        (plate.landing(query, start, height), is_inside)
+    pub fn plates(&self) -> Plates<'_> {
+        Plates(&self.plates)
     }
 
     /// Does something with what [`Surface::land`] finds, which then need not go through memory.
@@ -46,13 +62,16 @@ impl Surface {
         start: u32,
         take: impl FnOnce(Landing) -> T,
     ) -> T {
-        const MOST: usize = 6;
+        const MOST: usize = 8;
         let (mut triangle, mut before) = (start, NONE);
         for _ in 0..MOST {
             let plate = &self.plates[triangle as usize];
             match plate.side(query) {
                 Side::Inside(height) => return take(plate.landing(query, triangle, height)),
-                Side::InReach => break,
+                Side::InReach(height) => match self.closest_rival(query, triangle, height) {
+                    None => return take(plate.landing(query, triangle, height)),
+                    Some(rival) => (before, triangle) = (NONE, rival),
+                },
                 Side::Beyond(edge) => {
                     let beyond = plate.beyond(edge);
                     if beyond == NONE {
@@ -78,12 +97,16 @@ impl Surface {
         start: u32,
     ) -> Landing {
         let plate = &self.plates[triangle as usize];
-        let point = match plate.on_edge(edge, query) {
-            OnEdge::Between(point) => Some(point),
-            OnEdge::Beyond(corner) => self.on_corner(query, triangle, corner),
-            OnEdge::InReach => None,
+        let ends = [edge, (edge + 1) % 3].map(|corner| self.corner(triangle, corner));
+        let (point, edges) = match plate.on_edge(edge, ends, query) {
+            OnEdge::Between(point) => (Some(point), 1 << edge),
+            OnEdge::Beyond(corner) => (
+                self.on_corner(query, triangle, corner),
+                1 << corner | 1 << ((corner + 2) % 3),
+            ),
         };
-        let Some(point) = point else {
+        let is_closest = |point: &Vector3<f32>| !plate.has_rivals(point, query, edges);
+        let Some(point) = point.filter(is_closest) else {
             return self.land_by_walk(query, start);
         };
         Landing {
@@ -94,22 +117,46 @@ impl Surface {
         }
     }
 
-    /// A corner of a triangle, if no point around it is closer to the query.
+    /// A corner of a triangle, if no point of an edge that leaves it is closer to the query.
     fn on_corner(
         &self,
         query: &Vector3<f32>,
         triangle: u32,
         corner: usize,
     ) -> Option<Vector3<f32>> {
-        let plate = &self.plates[triangle as usize];
-        let point = plate.corner(corner);
+        let point = self.corner(triangle, corner);
         let away = (query - point).cast();
         let vertex = self.triangles[triangle as usize].vertices[corner];
         let mut spokes = self.spokes.get(vertex as usize).iter();
-        let edges = 1 << corner | 1 << ((corner + 2) % 3);
-        let is_closest = spokes.all(|spoke| spoke.edge.dot(&away) <= 0.0)
-            && !plate.has_rivals(&point, query, edges);
+        let is_closest = spokes.all(|spoke| spoke.edge.dot(&away) <= 0.0);
         is_closest.then_some(point)
+    }
+
+    /// Which of the triangles around one that rise towards a query at this height over it comes closest, if one comes
+    /// closer than the point straight below.
+    #[inline(never)]
+    fn closest_rival(&self, query: &Vector3<f32>, triangle: u32, height: f32) -> Option<u32> {
+        let (mut least, mut closest) = (height * height, None);
+        let exact = Point3::from(query.cast());
+        for &rival in self.rivals.all(triangle, height < 0.0) {
+            let (bound, is_reached) = self.plates[rival as usize].bound_squared(query);
+            if bound >= least {
+                continue;
+            }
+            let squared = match is_reached {
+                true => bound,
+                false => self.nearest_on(&exact, rival).squared as f32,
+            };
+            if squared < least {
+                (least, closest) = (squared, Some(rival));
+            }
+        }
+        closest
+    }
+
+    fn corner(&self, triangle: u32, corner: usize) -> Vector3<f32> {
+        let corner = self.triangles[triangle as usize].corner(corner);
+        corner.coords.cast()
     }
 
     #[inline(never)]

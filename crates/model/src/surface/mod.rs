@@ -15,7 +15,7 @@ use crate::plate::Plate;
 use crate::rivals::Rivals;
 use crate::triangle::{Feature, NONE, Triangle};
 
-pub use landing::Landing;
+pub use landing::{Landing, Plates};
 
 /// A point on a triangle of a [`Surface`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -354,6 +354,9 @@ mod tests {
                 traps += u32::from(is_trap);
                 let found = (surface.closest_point_from(&query, start).point - query).norm();
                 assert!(found - exact < 1e-12, "{query} from {start}");
+                let landing = surface.land(&query.coords.cast(), start);
+                let found = f64::from(landing.distance);
+                assert!((found - exact).abs() < 1e-7, "{query} from {start}");
             }
         }
         assert!(traps > 50, "only {traps} starts were traps");
@@ -424,8 +427,9 @@ mod tests {
                 let apart = (found.point.cast::<f64>() - query.coords).norm();
                 others += u32::from((distance - exact).abs() > 1e-7);
                 assert!((apart - distance).abs() < 1e-7);
-                let (inside, is_inside) = surface.land_inside(&single, start.triangle);
-                assert!(!is_inside || inside == found);
+                let (height, is_inside) = surface.plates().height_over(start.triangle, &single);
+                let over_start = (start.triangle, height.abs());
+                assert!(!is_inside || over_start == (found.triangle, found.distance));
                 insides += u32::from(is_inside);
                 // Their last bits tell them apart.
                 singles += u32::from(found != surface.land_by_walk(&single, start.triangle));
@@ -436,6 +440,24 @@ mod tests {
             let most = if dent == 0.0 { 0 } else { 20 };
             assert!(others <= most, "{others}");
         }
+    }
+
+    /// Points beside a sample, in the plane of its triangle.
+    #[test]
+    fn a_point_that_its_triangle_holds_is_where_it_lands() {
+        let surface = Surface::new(&ball(0.03)).unwrap();
+        let mut held = 0;
+        for index in 0..2000 {
+            let start = surface.sample(uniform(index));
+            let aside = Vector3::from(uniform(index + 7).map(|u| (u - 0.5) * 0.01));
+            let point = start.point + surface.normal(start.triangle).cross(&aside);
+            let point = point.coords.cast();
+            let found = surface.land(&point, start.triangle);
+            let stays = (found.triangle == start.triangle) && found.distance < 1e-7;
+            assert!(stays || !surface.plates().holds(start.triangle, &point));
+            held += u32::from(surface.plates().holds(start.triangle, &point));
+        }
+        assert!((500..1500).contains(&held), "{held}");
     }
 
     /// A walk does not get from one ball to the other.
