@@ -125,24 +125,22 @@ impl Cell {
         clouds.into_iter().flat_map(of_cloud).collect()
     }
 
-    /// Measures once more where that does not take minutes, and keeps what was quieter.
+    /// Measures once more, the plain version where that does not take minutes, and keeps what was quieter.
     fn measure(&mut self, robot: &Robot, round: usize) {
-        let (plain_rounds, rounds) = match self.particles {
-            ..100_000 => (ROUNDS, ROUNDS),
-            100_000..1_000_000 => (2, ROUNDS),
-            _ => (0, 2),
+        let plain_rounds = match self.particles {
+            ..100_000 => ROUNDS,
+            100_000..1_000_000 => 2,
+            _ => 0,
         };
         if round < plain_rounds {
             let stream = Stream::new(robot, self.cloud, self.most / 10);
             let times = plain_steps(robot, self.particles, &stream);
             self.plain = self.plain.quieter(times);
         }
-        if round < rounds {
-            let stream = Stream::new(robot, self.cloud, self.most);
-            for (threads, fast) in (1..).zip(&mut self.fast) {
-                let times = steps(robot, &paper(self.particles), &stream, threads);
-                *fast = fast.quieter(times);
-            }
+        let stream = Stream::new(robot, self.cloud, self.most);
+        for (threads, fast) in (1..).zip(&mut self.fast) {
+            let times = steps(robot, &paper(self.particles), &stream, threads);
+            *fast = fast.quieter(times);
         }
     }
 
@@ -161,7 +159,7 @@ impl Cell {
     }
 }
 
-/// So often all is measured that does not take minutes, in turns: what else a machine does slows it for seconds and minutes.
+/// So often all is measured, in turns: what else a machine does slows it for seconds and minutes.
 const ROUNDS: usize = 6;
 
 fn step_lines(robot: &Robot) {
