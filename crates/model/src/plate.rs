@@ -36,14 +36,6 @@ pub(crate) enum Side {
     InReach(f32),
 }
 
-/// The closest point on the line of an edge.
-pub(crate) enum OnEdge {
-    /// It is between the edge's ends.
-    Between(Vector3<f32>),
-    /// It is beyond this corner of the triangle.
-    Beyond(usize),
-}
-
 /// All edges, a bit each.
 const EDGES: u32 = 0b111;
 /// All edges, and the height.
@@ -90,6 +82,12 @@ impl Plate {
     fn depths_and_height(&self, point: &Vector3<f32>) -> f32x4 {
         let [x, y, z] = self.gradients;
         self.at_origin + x * point.x + y * point.y + z * point.z
+    }
+
+    /// The height of a point, m.
+    #[inline]
+    pub(crate) fn height(&self, point: &Vector3<f32>) -> f32 {
+        self.depths_and_height(point).as_array()[3]
     }
 
     /// The height of a point, m, and whether its closest point is inside and no neighbour comes closer.
@@ -141,9 +139,11 @@ impl Plate {
         let seen = self.depths_and_height(query);
         let [first, second, third, _] = (seen * self.units).to_array();
         let height = seen.as_array()[3];
-        let deepest = first.min(second).min(third);
-        let beyond = deepest.min(0.0);
-        (height * height + beyond * beyond, deepest >= 0.0)
+        // Not `min`, which spends most of its instructions on what is no number.
+        let lower = if second < first { second } else { first };
+        let lowest = if third < lower { third } else { lower };
+        let beyond = if lowest < 0.0 { lowest } else { 0.0 };
+        (height * height + beyond * beyond, lowest >= 0.0)
     }
 
     /// The triangle across an edge; [`NONE`] at a rim.
@@ -164,22 +164,21 @@ impl Plate {
         }
     }
 
-    /// The point of an edge that is closest to a query beyond it, given the edge's ends, m.
-    pub(crate) fn on_edge(
-        &self,
+    /// The point of an edge that is closest to a query beyond it, or else the corner that is: given the edge's ends, m.
+    pub(crate) fn nearest_on_edge(
         edge: usize,
         [from, to]: [Vector3<f32>; 2],
         query: &Vector3<f32>,
-    ) -> OnEdge {
+    ) -> Result<Vector3<f32>, usize> {
         let way = to - from;
         let share = way.dot(&(query - from)) / way.norm_squared();
         if share <= 0.0 {
-            return OnEdge::Beyond(edge);
+            return Err(edge);
         }
         if share >= 1.0 {
-            return OnEdge::Beyond((edge + 1) % 3);
+            return Err((edge + 1) % 3);
         }
-        OnEdge::Between(from + way * share)
+        Ok(from + way * share)
     }
 
     /// Whether a neighbour that rises may be closer to a query than a point on some of the triangle's edges (a bit

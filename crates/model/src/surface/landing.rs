@@ -5,7 +5,7 @@ use kiddo::SquaredEuclidean;
 use nalgebra::{Point3, Vector3};
 
 use super::{Surface, SurfacePoint};
-use crate::plate::{OnEdge, Plate, Side};
+use crate::plate::{Plate, Side};
 use crate::triangle::NONE;
 
 /// Where a point lands on a [`Surface`] when projected in single precision.
@@ -19,6 +19,14 @@ pub struct Landing {
     pub triangle: u32,
     /// Distance from the query, m.
     pub distance: f32,
+}
+
+/// What single precision tells of a query that both triangles of an edge see beyond it.
+enum OnEdge {
+    Landing(Landing),
+    /// This triangle is closer.
+    Rival(u32),
+    Unknown,
 }
 
 /// The triangles of a [`Surface`], each by itself.
@@ -62,58 +70,70 @@ impl Surface {
         start: u32,
         take: impl FnOnce(Landing) -> T,
     ) -> T {
-        const MOST: usize = 8;
+        const MOST: usize = 16;
         let (mut triangle, mut before) = (start, NONE);
         for _ in 0..MOST {
             let plate = &self.plates[triangle as usize];
             match plate.side(query) {
                 Side::Inside(height) => return take(plate.landing(query, triangle, height)),
-                Side::InReach(height) => match self.closest_rival(query, triangle, height) {
-                    None => return take(plate.landing(query, triangle, height)),
-                    Some(rival) => (before, triangle) = (NONE, rival),
-                },
+                Side::InReach(height) => {
+                    let squared = height * height;
+                    match self.closest_rival(query, triangle, height < 0.0, squared) {
+                        None => return take(plate.landing(query, triangle, height)),
+                        Some(rival) => (before, triangle) = (NONE, rival),
+                    }
+                }
                 Side::Beyond(edge) => {
                     let beyond = plate.beyond(edge);
                     if beyond == NONE {
                         break;
                     }
-                    if beyond == before {
-                        return take(self.land_on_edge(query, triangle, edge, start));
+                    if beyond != before {
+                        (before, triangle) = (triangle, beyond);
+                        continue;
                     }
-                    (before, triangle) = (triangle, beyond);
+                    match self.land_on_edge(query, triangle, edge) {
+                        OnEdge::Landing(landing) => return take(landing),
+                        OnEdge::Rival(rival) => (before, triangle) = (NONE, rival),
+                        OnEdge::Unknown => break,
+                    }
                 }
             }
         }
-        take(self.land_by_walk(query, start))
+        take(self.land_by_walk(query, triangle))
     }
 
     /// Where both triangles of an edge see the query beyond it.
     #[inline(never)]
-    fn land_on_edge(
-        &self,
-        query: &Vector3<f32>,
-        triangle: u32,
-        edge: usize,
-        start: u32,
-    ) -> Landing {
+    fn land_on_edge(&self, query: &Vector3<f32>, triangle: u32, edge: usize) -> OnEdge {
         let plate = &self.plates[triangle as usize];
         let ends = [edge, (edge + 1) % 3].map(|corner| self.corner(triangle, corner));
-        let (point, edges) = match plate.on_edge(edge, ends, query) {
-            OnEdge::Between(point) => (Some(point), 1 << edge),
-            OnEdge::Beyond(corner) => (
-                self.on_corner(query, triangle, corner),
-                1 << corner | 1 << ((corner + 2) % 3),
-            ),
+        let point = match Plate::nearest_on_edge(edge, ends, query) {
+            Ok(point) => {
+                let squared = (query - point).norm_squared();
+                for side in [triangle, plate.beyond(edge)] {
+                    let plate = &self.plates[side as usize];
+                    let height = plate.height(query);
+                    if let Some(rival) = self.closest_rival(query, side, height < 0.0, squared) {
+                        return OnEdge::Rival(rival);
+                    }
+                }
+                Some(point)
+            }
+            Err(corner) => {
+                let edges = 1 << corner | 1 << ((corner + 2) % 3);
+                let corner = self.on_corner(query, triangle, corner);
+                corner.filter(|point| !plate.has_rivals(point, query, edges))
+            }
         };
-        let is_closest = |point: &Vector3<f32>| !plate.has_rivals(point, query, edges);
-        let Some(point) = point.filter(is_closest) else {
-            return self.land_by_walk(query, start);
-        };
-        Landing {
-            point,
-            normal: plate.normal(),
-            triangle,
-            distance: (query - point).norm(),
+        match point {
+            None => OnEdge::Unknown,
+            Some(point) => OnEdge::Landing(Landing {
+                point,
+                normal: plate.normal(),
+                triangle,
+                distance: (query - point).norm(),
+            }),
         }
     }
 
@@ -132,13 +152,19 @@ impl Surface {
         is_closest.then_some(point)
     }
 
-    /// Which of the triangles around one that rise towards a query at this height over it comes closest, if one comes
-    /// closer than the point straight below.
+    /// Which of the triangles around one that rise above it, or fall below, comes closest to a query, if one comes closer
+    /// than this squared distance, m².
     #[inline(never)]
-    fn closest_rival(&self, query: &Vector3<f32>, triangle: u32, height: f32) -> Option<u32> {
-        let (mut least, mut closest) = (height * height, None);
+    fn closest_rival(
+        &self,
+        query: &Vector3<f32>,
+        triangle: u32,
+        below: bool,
+        squared: f32,
+    ) -> Option<u32> {
+        let (mut least, mut closest) = (squared, None);
         let exact = Point3::from(query.cast());
-        for &rival in self.rivals.all(triangle, height < 0.0) {
+        for &rival in self.rivals.all(triangle, below) {
             let (bound, is_reached) = self.plates[rival as usize].bound_squared(query);
             if bound >= least {
                 continue;
