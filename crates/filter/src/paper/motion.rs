@@ -87,7 +87,7 @@ impl LinkMotion {
             }
             MotionModel::Curvature => self.roll(block, range.clone(), surface, draws, room),
         }
-        scatter(block, range.clone(), surface, draws, room);
+        scatter(block, range.clone(), surface, draws, &mut room.places);
         for at in range {
             block.force[at] = (block.force[at] + draws.force[at]).clamp(0.0, MOST);
             block.stiffness[at] = (block.stiffness[at] * draws.stiffness[at]).min(MOST);
@@ -209,9 +209,8 @@ fn scatter(
     range: Range<usize>,
     surface: &Surface,
     draws: &Draws,
-    room: &mut Room,
+    places: &mut [Column; 3],
 ) {
-    let places = &mut room.places;
     for at in range.clone() {
         let [along, across] = tangents(&block.normal(at));
         let noise = along * draws.location[0][at] + across * draws.location[1][at];
